@@ -29,7 +29,7 @@ from kemba.identify.design.menu import JudgedRig
 from kemba.identify.design.rig import design_rig_test
 from kemba.identify.design.settings import ExperimentSettings
 from kemba.model.spec import load_model
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 
 DOCS = ROOT / "docs" / "experiment.md"
 PAIRS = (  # what is there, and what it is taken for

@@ -24,9 +24,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from block import put_block
 
 from kemba.ocp import load_task, task_model
+from kemba.plant.certificate import rest_after, told
 from kemba.plant.controller import execute
 from kemba.plant.repeat import plant_of
-from kemba.plant.replay import rest_after, told
 from kemba.runs import load_run
 from kemba.sweep import machine
 

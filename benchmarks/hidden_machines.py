@@ -27,7 +27,7 @@ from twin.scripts import Script, from_table
 
 from kemba.events import STAYS, UPRIGHT
 from kemba.plant.controller import Gains
-from kemba.plotting.robot.machine import load_machine
+from kemba.plotting.source import load_machine
 from kemba.trajectory import Trajectory
 
 POOL = (  # of the twin's catalogue: what changes a jump

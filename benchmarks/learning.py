@@ -32,21 +32,19 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
 from kemba.identify.written.adopt import item
-from kemba.learn.aim import Aim
-from kemba.learn.correction import correction_from
-from kemba.learn.flight import flight_of
+from kemba.learn.correction import Aim, correction_from, flight_of
 from kemba.learn.round import Asked, learn
 from kemba.model import load_spec
 from kemba.ocp import load_task, task_model
 from kemba.ocp.certificate.status import Status
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
-from kemba.plant.replay import rest_after
-from kemba.plotting.robot.machine import load_machine
+from kemba.plotting.source import load_machine
 from kemba.report import solve_into
 from kemba.runs import RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of
-from kemba.sweep.workers.machine import machine as this_computer
+from kemba.sweep.farm import machine as this_computer
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "learn.md"
 MARKS = ("<!-- machines: written by benchmarks/learning.py -->", "<!-- end of machines -->")

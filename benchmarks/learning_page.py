@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 
 Row = dict[str, Any]
 GOOD = 5e-3  # m, the apex error that is aimed at

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kemba.config import load_yaml
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 
 ROOT = Path(__file__).parents[1]
 LIST = Path(__file__).with_suffix(".yaml")

@@ -27,7 +27,7 @@ from kemba.events import peak
 from kemba.ocp import controller_table, load_task, plan
 from kemba.plant import Execution, execute, execute_many, replay, replays
 from kemba.plant.repeat import counterpart
-from kemba.sweep.workers.machine import machine
+from kemba.sweep.farm import machine
 from kemba.trajectory import Trajectory
 
 MARKS = ("<!-- speed: written by benchmarks/plant_speed.py -->", "<!-- end of speed -->")

@@ -12,8 +12,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from kemba.plant.characterise import characterise
 from kemba.plant import tables
+from kemba.plant.characterise import characterise
 from kemba.plant.rigs import bench_model, load_rig, run_rig
 from kemba.plotting import plot_rig, save_figure
 from kemba.trajectory import Trajectory

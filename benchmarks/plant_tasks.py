@@ -19,7 +19,7 @@ from typing import Any
 
 from block import put_block
 
-from kemba.sweep.workers.machine import machine
+from kemba.sweep.farm import machine
 
 TASKS = ("jump", "hop", "max_jump", "drop", "stand", "jump_forward")
 MARKS = ("<!-- executions: written by benchmarks/plant_tasks.py -->", "<!-- end of executions -->")

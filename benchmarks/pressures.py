@@ -20,9 +20,9 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute
 from kemba.plant.repeat import plant_of
-from kemba.plant.replay import rest_after
 from kemba.policy.course import course_of
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
@@ -30,8 +30,8 @@ from kemba.policy.write import policy_arrays
 from kemba.runs import Run, load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
-from kemba.scenarios.expected import executions_of
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.feedback import executions_of
+from kemba.scenarios.share import wilson
 from kemba.trajectory import Trajectory
 
 DWELL = 8  # ticks between two switchings of a valve, which shuts in about 6 ms

@@ -65,7 +65,7 @@ LIBRARIES = {
     ),
 }
 KEMBA = (
-    "from kemba.logs.opening import raw_columns; from kemba.logs.draft.layout import layout_of; "
+    "from kemba.logs.foreign import raw_columns; from kemba.logs.draft.draft import layout_of; "
     "from kemba.logs import ColumnMap; from pathlib import Path; import pandas; "
     "from kemba.logs.formats import reader; reader(Path(p)) if {binary} else None",
     "d = raw_columns(Path(p), ColumnMap.model_construct())",

@@ -26,7 +26,7 @@ from kemba.ocp import load_task
 from kemba.ocp.task.task import parse_task
 from kemba.report import solve_into
 from kemba.runs import RunFolder
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 from kemba.solve import Approach, Listener
 
 TASKS = ("jump", "hop", "stand", "drop", "jump_forward", "max_jump", "crouch", "turn")

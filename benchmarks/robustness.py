@@ -32,9 +32,9 @@ from kemba.errors import KembaError
 from kemba.files import atomic_text, sha256
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute
 from kemba.plant.repeat import plant_of
-from kemba.plant.replay import rest_after
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE
@@ -42,7 +42,7 @@ from kemba.runs import Run, load_run
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.feedback import policy_of
-from kemba.sweep.workers.machine import machine
+from kemba.sweep.farm import machine
 
 TASKS = ("jump", "jump_forward", "hop", "stand", "drop", "max_jump")
 WAYS = {  # how a table is executed, under which uncertainties

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from kemba.scenarios.rate import wilson
-from kemba.sweep.table.influence import InfluenceSettings, rank, with_sizes
+from kemba.scenarios.share import wilson
+from kemba.sweep.results import InfluenceSettings, rank, with_sizes
 from kemba.units import read_si
 
 Row = dict[str, Any]

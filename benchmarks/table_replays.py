@@ -21,8 +21,9 @@ from block import put_block
 from kemba.events import EXECUTED, PLANNED, read
 from kemba.model import Model
 from kemba.ocp import load_task
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
-from kemba.plant.replay import Replay, rest_after
+from kemba.plant.replay import Replay
 from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 from kemba.trajectory import Trajectory

@@ -31,7 +31,7 @@ STAGES = {
     "table": ("kemba.solve.trial", "retimed"),
     "replays": ("kemba.solve.trial", "judged"),
     "files": ("kemba.report.solving", "_write"),
-    "figure": ("kemba.report.drawing", "draw_plan"),
+    "figure": ("kemba.report.solving", "draw_plan"),
 }
 
 

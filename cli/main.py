@@ -14,29 +14,28 @@ from typing import Annotated
 import typer
 
 import kemba
-from kemba_cli.earlier import figure_at, is_new_folder, is_picture
+from kemba_cli.common import with_verbose
 from kemba_cli.failures import guarded
-from kemba_cli.usage import Command
-from kemba_cli.verbose import with_verbose
-from kemba_cli.verbs.identify.adopt import adopt
-from kemba_cli.verbs.identify.characterise import characterise
-from kemba_cli.verbs.identify.compare import compare
-from kemba_cli.verbs.identify.discover import discover
-from kemba_cli.verbs.identify.experiment import experiment
-from kemba_cli.verbs.identify.learn import learn
-from kemba_cli.verbs.inspect.check import check
-from kemba_cli.verbs.inspect.effects import effects
-from kemba_cli.verbs.inspect.map import draft_map
-from kemba_cli.verbs.inspect.schema import schema
-from kemba_cli.verbs.plan.export import export
-from kemba_cli.verbs.plan.sensitivity import sensitivity
-from kemba_cli.verbs.plan.simulate import simulate
-from kemba_cli.verbs.plan.solve import solve
-from kemba_cli.verbs.plan.sweep import sweep
-from kemba_cli.verbs.show.plot import plot
-from kemba_cli.verbs.show.report import report
-from kemba_cli.verbs.show.review import review
-from kemba_cli.verbs.show.view import view
+from kemba_cli.usage import Command, figure_at, is_new_folder, is_picture
+from kemba_cli.verbs.adopt import adopt
+from kemba_cli.verbs.characterise import characterise
+from kemba_cli.verbs.check import check
+from kemba_cli.verbs.compare import compare
+from kemba_cli.verbs.discover import discover
+from kemba_cli.verbs.effects import effects
+from kemba_cli.verbs.experiment import experiment
+from kemba_cli.verbs.export import export
+from kemba_cli.verbs.learn import learn
+from kemba_cli.verbs.map import draft_map
+from kemba_cli.verbs.plot import plot
+from kemba_cli.verbs.report import report
+from kemba_cli.verbs.review import review
+from kemba_cli.verbs.schema import schema
+from kemba_cli.verbs.sensitivity import sensitivity
+from kemba_cli.verbs.simulate import simulate
+from kemba_cli.verbs.solve import solve
+from kemba_cli.verbs.sweep import sweep
+from kemba_cli.verbs.view import view
 
 PANELS = {  # as --help groups them
     "Plan": (solve, sensitivity, sweep),

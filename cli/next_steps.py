@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from kemba_cli.common import effect_files, say
 
 if TYPE_CHECKING:
-    from kemba.report.review.verdict import ReviewVerdict
+    from kemba.report.verdict import ReviewVerdict
 
 PLANNING = "planning"
 EXECUTED = "--repeat 3 --noise"

@@ -19,7 +19,7 @@ SCHEMAS = {
     "models": "kemba.model.spec:ModelSpec",
     "robots": "kemba.mechanism.links:RobotFile",
     "cylinders": "kemba.mechanism.cylinder:CylinderTable",
-    "sweeps": "kemba.sweep.cases.schema:Sweep",
+    "sweeps": "kemba.sweep.cases:Sweep",
     "uncertainties": "kemba.scenarios.draw:Uncertainties",
     "rigs": "kemba.plant.rigs:RigFile",
     "maps": "kemba.logs.columns:ColumnMap",

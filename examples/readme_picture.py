@@ -19,9 +19,8 @@ from PIL import Image, ImageSequence
 
 import kemba
 from kemba.plotting import load_machine, load_source
-from kemba.plotting.robot.poses import poses
-from kemba.plotting.robot.sticks import StickFigure
-from kemba.plotting.robot.strip import draw_ground
+from kemba.plotting.source import poses
+from kemba.plotting.sticks import StickFigure, draw_ground
 from kemba.plotting.style import BLUE, GREEN, GREY, INK, VERMILLION, paper_style
 
 OUT = Path(__file__).resolve().parents[1] / "docs/images/jump.gif"

@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 from kemba.ocp import load_task, task_model
 from kemba.ocp.refinement.sample import to_trajectory
 from kemba.ocp.transcription.stage import COST_SCALE
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
-from kemba.plant.replay import rest_after
-from kemba.report.sensitivity import sensitivity_of_run
 from kemba.runs import Run, load_run
 from kemba.sensitivity import Sensitivity, figures, sensitivity, write_sensitivity
 from kemba.sensitivity.replanned import PlanProgram, solution
+from kemba.sensitivity.table import sensitivity_of_run
 from kemba_cli.main import app
 
 FIGURES = ("height", "supply", "payload", "chamber.vent")

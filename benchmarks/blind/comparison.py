@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from blind.kinds import Record, hidden, kind, named
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 
 Names = Callable[[Record], list[str]]
 HEAD = (

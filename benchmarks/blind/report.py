@@ -11,7 +11,7 @@ from typing import Any
 from blind.comparison import comparison
 from blind.kinds import SHAPES, Record, hidden, kind, likely, named
 from kemba.files import atomic_text
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 
 SURE = 0.95
 FALLS = 5.0  # times that the error beyond the noise has to fall where several effects are hidden

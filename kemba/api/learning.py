@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from kemba.api.result import Result
+from kemba.api.planning import Result
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer, Ranked
 from kemba.identify.compare.compare import Comparison
@@ -43,7 +43,7 @@ class Compared(Result):
 
     def figure(self) -> Figure:
         """Errors by condition, and the missing forces with their bands."""
-        from kemba.plotting.study.comparison import plot_comparison
+        from kemba.plotting.comparison import plot_comparison
 
         return plot_comparison(self.comparison)
 
@@ -77,7 +77,7 @@ class Discovered(Result):
 
     def figure(self) -> Figure:
         """What is left of the error. Raises KembaError for bad data."""
-        from kemba.plotting.study.discovery import plot_residual
+        from kemba.plotting.studies import plot_residual
 
         if self.found is None:
             raise KembaError("", "bad data were not fitted", hint="read the remarks of the answer")

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import io
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kemba.api.loading import settings
-from kemba.api.result import Result
 from kemba.config import Document, beside, find_config
 from kemba.effects import BY_KIND
+from kemba.errors import KembaError
 from kemba.files import read_json
+from kemba.folders import claimed
+from kemba.identify.logs.reading import read_log
+from kemba.logs import ColumnMap, load_map
+from kemba.model import Model
+from kemba.model import load_model as load
 from kemba.model.spec import model_files
-from kemba.ocp import Task, load_task
+from kemba.ocp import Task
+from kemba.ocp import load_task as load_with_document
+from kemba.plant.repeat import Repeat, kept, plant_of, repeat_run
 from kemba.report import solve_into
 from kemba.runs import Run, RunFolder, load_run
 from kemba.solve import Approach, Listener
@@ -22,6 +32,70 @@ from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+class Result(ABC):
+    """An answer with a sentence, a verdict and a figure."""
+
+    @property
+    @abstractmethod
+    def sentence(self) -> str:
+        """The answer in words, as the command prints it."""
+
+    @property
+    @abstractmethod
+    def good(self) -> bool:
+        """Whether the command would exit with 0."""
+
+    @abstractmethod
+    def figure(self) -> Figure:
+        """The answer drawn. Raises KembaError where there is nothing to draw."""
+
+    def __str__(self) -> str:
+        return self.sentence
+
+    def _repr_html_(self) -> str:
+        """Sentence and figure, for notebooks."""
+        colour = "#1a7f37" if self.good else "#b42318"
+        text = f'<p style="color:{colour}">{html.escape(self.sentence)}</p>'
+        buffer = io.BytesIO()
+        try:
+            self.figure().savefig(buffer, format="png", dpi=100)
+        except KembaError:  # nothing to draw
+            return text
+        data = base64.b64encode(buffer.getvalue()).decode()
+        return f'{text}<img alt="{html.escape(self.sentence)}" src="data:image/png;base64,{data}">'
+
+
+Path_ = str | Path
+
+
+def load_task(name: Path_, **changes: Any) -> Task:
+    """A task: a path or a shipped name such as `jump.yaml`.
+
+    `changes` are those of `--set`: `height="0.6 m"`; keys with points go in as
+    `**{"goals.apex": "0.6 m"}`. Raises KembaError with every mistake at its line.
+    """
+    return load_with_document(name, settings(changes))[0]
+
+
+def load_model(name: Path_ = "planning", supply: float | None = None) -> Model:
+    """A model: a path or a shipped name. `supply` in Pa. Raises KembaError."""
+    return load(name, supply=supply)
+
+
+def load_log(path: Path_, columns: ColumnMap | Path_ | None = None) -> Trajectory:
+    """A log of any format that `docs/logs.md` lists; `columns` is a column map or its file.
+
+    Raises KembaError with row and column of the first fault.
+    """
+    known = columns is None or isinstance(columns, ColumnMap)
+    return read_log(path, columns if known else load_map(columns))  # type: ignore[arg-type]
+
+
+def settings(changes: dict[str, Any]) -> list[str]:
+    """Changes as the `key=value` texts of `--set`."""
+    return [f"{key}={value}" for key, value in changes.items()]
 
 
 @dataclass(frozen=True)
@@ -92,7 +166,7 @@ def plan(
     if isinstance(task, Task):
         resolved, document = task, Document(task.model_dump())
     else:
-        resolved, document = load_task(task, settings(changes))
+        resolved, document = load_with_document(task, settings(changes))
     if model is not None:
         resolved = resolved.model_copy(update={"model": beside(str(model), Path())})
     models: list[str | Path] = [*model_files(resolved.model), *model_files(resolved.plant)]
@@ -109,3 +183,64 @@ def plan(
         figure=False,
     )
     return Planned(folder.path, answer)
+
+
+@dataclass(frozen=True)
+class Executions(Result):
+    """Executions of one run and the logs that were written."""
+
+    run: Path
+    plant: str
+    repeats: tuple[Repeat, ...]
+
+    @property
+    def logs(self) -> list[Path]:
+        """The logs, in the log format."""
+        return [repeat.path for repeat in self.repeats]
+
+    @property
+    def landed(self) -> int:
+        """How many ended standing, or upright where the plan does not land."""
+        return sum(repeat.replay is not None and repeat.replay.landed for repeat in self.repeats)
+
+    @property
+    def good(self) -> bool:
+        """Whether all did."""
+        return self.landed == len(self.repeats)
+
+    @property
+    def sentence(self) -> str:
+        """What was reached, in words."""
+        apex = ", ".join(f"{repeat.summary['apex_m']:.3f}" for repeat in self.repeats)
+        return f"reached {apex} m on {self.plant}; {kept(self.repeats)}"
+
+    def figure(self) -> Figure:
+        """Plan and executions on one sheet."""
+        from kemba import plotting
+
+        return plotting.draw(plotting.load_sources([self.run, *self.logs]))
+
+
+def simulate(
+    run: Planned | str | Path,
+    out: str | Path | None = None,
+    *,
+    plant: str | None = None,
+    repeat: int = 1,
+    noise: bool = False,
+    seed: int = 0,
+    force: bool = False,
+    progress: Tell = silent,
+) -> Executions:
+    """Execute a run's controller on the plant and write logs, as `kemba-opt simulate` does.
+
+    `out`: folder for the logs, a new one in the run without it. The same `seed` gives the same
+    logs. `progress` gets the name of every execution. Raises KembaError where the run has no
+    controller table.
+    """
+    path = run.path if isinstance(run, Planned) else Path(run)
+    default = (path if path.is_dir() else path.parent) / "logs"
+    model = plant_of(path, plant)
+    with claimed(None if out is None else Path(out), default, "*.csv", force) as folder:
+        repeats = repeat_run(path, model, folder, repeat, noise, seed, tell=progress)
+    return Executions(path, model.name, tuple(repeats))

@@ -1,7 +1,15 @@
 """Configuration files: from YAML to checked data, every mistake at its line."""
 
-from kemba.config.document import Document, Location, dump_yaml, load_text, load_yaml, written
-from kemba.config.names import FileName
+from kemba.config.document import (
+    Document,
+    FileName,
+    Location,
+    Section,
+    dump_yaml,
+    load_text,
+    load_yaml,
+    written,
+)
 from kemba.config.parsing import (
     apply_overrides,
     beside,
@@ -12,7 +20,6 @@ from kemba.config.parsing import (
     shipped_configs,
     shipped_folder,
 )
-from kemba.config.section import Section
 
 __all__ = [
     "Document",

@@ -4,13 +4,77 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from kemba.config.reader import Location, Mark, YamlError, YamlLimits, read
-from kemba.config.writer import dump_text
+from pydantic import AfterValidator, BaseModel, ConfigDict, WithJsonSchema
+
+from kemba.config.reader import PATTERNS, Location, Mark, YamlError, YamlLimits, read
 from kemba.errors import ConfigErrors, KembaError
 from kemba.files import atomic_text
+
+WIDTH = 100  # characters of a line
+
+
+def dump_text(data: Any) -> str:
+    """Plain data as YAML text; keys keep their order.
+
+    Raises TypeError for what is no plain data.
+    """
+    import yaml
+
+    try:
+        text: str = yaml.dump(
+            data, Dumper=_dumper(), width=WIDTH, sort_keys=False, allow_unicode=True,
+            default_flow_style=False,
+        )  # fmt: skip
+    except yaml.representer.RepresenterError as error:
+        raise TypeError(f"cannot be written as YAML: {error}") from None
+    return text
+
+
+@lru_cache(maxsize=1)
+def _dumper() -> Any:
+    """PyYAML's dumper, made to quote what YAML 1.2 would misread and to indent lists."""
+    import yaml
+
+    class Dumper(yaml.SafeDumper):  # type: ignore[misc]
+        yaml_implicit_resolvers: Any = {}  # noqa: RUF012  PyYAML's way: by first character
+
+        def increase_indent(self, flow: bool = False, indentless: bool = False) -> Any:
+            return super().increase_indent(flow, False)
+
+        def ignore_aliases(self, data: Any) -> bool:
+            return True
+
+    for kind, pattern in PATTERNS.items():
+        Dumper.add_implicit_resolver(f"tag:yaml.org,2002:{kind}", _whole(pattern), None)
+    Dumper.add_representer(float, _float)
+    Dumper.add_representer(str, _text)
+    return Dumper
+
+
+def _whole(pattern: Any) -> Any:
+    """The pattern for PyYAML, which asks `match` only."""
+    import re
+
+    return re.compile(rf"(?:{pattern.pattern})\Z")
+
+
+def _float(dumper: Any, value: float) -> Any:
+    """A float as Python writes it, `1e-05`; never as a whole number."""
+    named = {"inf": ".inf", "-inf": "-.inf", "nan": ".nan"}
+    text = repr(value)
+    return dumper.represent_scalar("tag:yaml.org,2002:float", named.get(text, text))
+
+
+def _text(dumper: Any, value: str) -> Any:
+    """A text; with escapes where it holds characters that only YAML reads as line ends, quoted
+    where it would merge groups."""
+    style = '"' if set(value) & set("\x85\u2028\u2029") or value == "<<" else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
+
 
 __all__ = ["Document", "Location", "dump_text", "dump_yaml", "load_text", "load_yaml", "written"]
 
@@ -140,3 +204,29 @@ def _syntax_error(error: YamlError, document: Document) -> KembaError:
     if tight and "expected ':'" in error.what:
         hint = f"a space is missing behind the colon in line {tight[-1]}"
     return document.error_at(line, column, error.what, hint=hint)
+
+
+LONGEST = 80  # characters; file systems allow 255 bytes, endings and numbers included
+NAME = rf"\w[\w .+-]{{0,{LONGEST - 1}}}"
+
+
+def check_name(name: str) -> str:
+    """The name, if every system allows it as a file name and it is no path. Raises ValueError."""
+    if not re.fullmatch(NAME, name):
+        shown = name if len(name) <= LONGEST else f"{name[:LONGEST]}..."
+        raise ValueError(
+            f"'{shown}' cannot name a file or folder; letters, digits, spaces and _ . + - were "
+            f"expected, beginning with a letter or digit, at most {LONGEST} characters"
+        )
+    return name
+
+
+FileName = Annotated[
+    str, AfterValidator(check_name), WithJsonSchema({"type": "string", "pattern": f"^{NAME}$"})
+]
+
+
+class Section(BaseModel):
+    """A frozen part of a file; unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)

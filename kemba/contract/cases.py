@@ -19,8 +19,7 @@ from kemba.effects.sensors import SensorEffect
 from kemba.errors import KembaError
 from kemba.mechanism.own_rigs import CylinderRig, DriveRig, Load, VesselRig
 from kemba.model import Model, load_spec
-from kemba.model.own_rig import own_model
-from kemba.model.spec import build_model
+from kemba.model.spec import build_model, own_model
 
 Array = np.ndarray
 Point = dict[str, Array]

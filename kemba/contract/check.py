@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
+import math
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from kemba.contract import measuring, physics, words
+from kemba.config import Document, parse
+from kemba.config.document import dump_text, load_text
+from kemba.contract import physics
 from kemba.contract.cases import Broken, Placed
 from kemba.effects import Effect
 from kemba.effects.catalogue import DRIVE, OWN_RIGS
 from kemba.effects.registry import kind_of
 from kemba.errors import KembaError
+from kemba.model.spec import ModelSpec
+from kemba.quantity import is_si
 
 __all__ = ["CHECKS", "Broken", "Check", "CheckResult", "examine"]
 
@@ -55,24 +61,6 @@ class Check:
         return (self.run.__doc__ or "").split("\n")[0]
 
 
-CHECKS = (
-    Check(words.documented),
-    Check(words.off_is_admissible),
-    Check(words.yaml_round_trip),
-    Check(words.schema_names_units),
-    Check(physics.finite),
-    Check(physics.every_parameter_matters),
-    Check(physics.off_is_absent, _switched),
-    Check(physics.dissipates, _dissipative),
-    Check(physics.order_does_not_matter),
-    Check(physics.supply_can_be_left_open),
-    Check(physics.keeps_the_mirror, _on_legs),
-    Check(physics.one_leg_only, _on_one_leg),
-    Check(measuring.sensor_fault_can_be_undone, measuring.measures),
-    Check(measuring.nominal_figures_matter, measuring.moves),
-)
-
-
 @dataclass(frozen=True)
 class CheckResult:
     """How a check of an effect ended; `sentence` says what is wrong."""
@@ -105,3 +93,88 @@ def _raised(error: Exception) -> str:
     frame = own[-1] if own else frame
     text = str(error).splitlines()[0] if str(error) else ""
     return f"{type(error).__name__} at {Path(frame.filename).name}:{frame.lineno}: {text}"
+
+
+def documented(placed: Placed) -> None:
+    """Docstring, family, equation and source are there; every parameter has an SI unit and a doc.
+
+    Raises Broken where it is not so.
+    """
+    effect = placed.effect
+    if not effect.__doc__ or effect.__doc__ == effect.__base__.__doc__:
+        raise Broken("the class has no docstring")
+    for name in ("family", "equation", "source"):
+        if not getattr(effect, name):
+            raise Broken(f"`{name}` is empty")
+    for name, param in effect.declared().items():
+        if not is_si(param.unit):
+            raise Broken(f"{name}: '{param.unit}' is not an SI unit")
+        if not param.doc:
+            raise Broken(f"{name}: its Param has no doc")
+        if not (math.isfinite(param.size) and param.size > 0):
+            raise Broken(f"{name}: its size is {param.size}; a positive number was expected")
+    for role in ("states", "inputs", "forces"):
+        for quantity in getattr(placed.on, role)().values():
+            if not (is_si(quantity.unit) and quantity.doc):
+                raise Broken(f"{quantity.name}: an SI unit and a doc were expected")
+
+
+def off_is_admissible(placed: Placed) -> None:
+    """`off` names declared parameters, lies within their bounds and is their default.
+
+    Raises Broken where it is not so.
+    """
+    effect = placed.effect
+    for name, off in effect.off.items():
+        if name not in effect.declared():
+            raise Broken(f"`off` names '{name}', which is no parameter")
+        param = effect.declared()[name]
+        if not param.lower <= off <= param.upper:
+            raise Broken(f"{name}: the off value {off:g} is outside {param.bounds}")
+        if math.isfinite(off) and effect.model_fields[name].default != off:
+            raise Broken(f"{name}: its default must be its off value {off:g}")
+    both = set(placed.on.shapes()) & set(effect.off)
+    if both:
+        raise Broken(f"{sorted(both)[0]} is a shape and in `off`")
+
+
+def yaml_round_trip(placed: Placed) -> None:
+    """Written to YAML and read again it is the same effect.
+
+    Raises Broken where it is not so.
+    """
+    text = dump_text({"effects": [placed.on.listed()]})
+    found = parse(load_text(text, "round trip"), ModelSpec).effects
+    if found != (placed.on,):
+        raise Broken(f"{placed.on!r} came back as {found!r}")
+    json.dumps(placed.on.listed())
+    parse(Document({"effects": [placed.on.listed()]}), ModelSpec)
+
+
+def schema_names_units(placed: Placed) -> None:
+    """The JSON Schema names the unit of every parameter.
+
+    Raises Broken where it is not so.
+    """
+    schema = json.dumps(placed.effect.model_json_schema())
+    for name, param in placed.effect.declared().items():
+        if f'"unit": "{param.unit}"' not in schema:
+            raise Broken(f"{name}: the schema does not name its unit {param.unit}")
+
+
+CHECKS = (
+    Check(documented),
+    Check(off_is_admissible),
+    Check(yaml_round_trip),
+    Check(schema_names_units),
+    Check(physics.finite),
+    Check(physics.every_parameter_matters),
+    Check(physics.off_is_absent, _switched),
+    Check(physics.dissipates, _dissipative),
+    Check(physics.order_does_not_matter),
+    Check(physics.supply_can_be_left_open),
+    Check(physics.keeps_the_mirror, _on_legs),
+    Check(physics.one_leg_only, _on_one_leg),
+    Check(physics.sensor_fault_can_be_undone, physics.measures),
+    Check(physics.nominal_figures_matter, physics.moves),
+)

@@ -8,17 +8,16 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from kemba.learn.expected import ExpectedApex
+from kemba.learn.outcome import ExpectedApex, effects
 from kemba.learn.round import Round
-from kemba.learn.words import effects
 from kemba.ocp import load_task, task_model
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
-from kemba.plant.replay import rest_after
-from kemba.plotting.study.learning import plot_executions, plot_rounds
+from kemba.plotting.studies import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
-from kemba.report.review.html import pairs, table
-from kemba.report.review.verdict import ReviewVerdict
-from kemba.report.stage import write_page
+from kemba.report.charts import pairs, table
+from kemba.report.verdict import ReviewVerdict
+from kemba.report.view import write_page
 
 Rows = Iterable[tuple[str, Any]]
 

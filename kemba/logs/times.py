@@ -1,13 +1,14 @@
-"""Times written as texts: dates, clocks of day, durations."""
+"""Times of recordings: stamps of any kind, rates, gaps."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 
 import numpy as np
 
 from kemba.logs.recording import Column
-from kemba.trajectory import Array
+from kemba.trajectory import Array, Trajectory
 
 CLOCK = re.compile(
     r"(?:(?P<days>[+-]?\d+) days?,? *)?(?P<sign>[+-])?(?:(?P<hour>\d{1,2}):)?(?P<minute>\d{1,2}):"
@@ -73,3 +74,104 @@ def _clock(text: str) -> tuple[float, float, str] | None:
         return int(days) * DAY + value, 0.0, ""
     value = -value if match["sign"] == "-" else value
     return value, DAY if match["hour"] else HOUR, match["zone"] or ""
+
+
+FULL = 0.9  # share of the rows in which the fastest channel is read, of a table of one rate
+LONGEST = 2.5  # steps of a channel; farther apart, nothing is known between two readings
+COMMANDS = ("valve/extend", "valve/retract", "hip/tau")
+
+
+def is_command(name: str) -> bool:
+    """Whether a column is a command, which holds until the next one; else it is measured."""
+    return f"/{name.split(' [')[0]}".endswith(tuple(f"/{command}" for command in COMMANDS))
+
+
+def placed(time: Array, own: Array, values: Array, hold: bool) -> Array:
+    """Readings `values` (m,) at `own` times (m,) on the clock `time` (n,), else NaN.
+
+    A reading stands at the nearest row, at the value that the channel has there between its own
+    readings; a command is held from the first row after it was sent.
+    """
+    good = np.isfinite(values) & np.isfinite(own)
+    own, values = own[good], values[good]
+    if not len(own):
+        return np.full(len(time), np.nan)
+    if hold:
+        last = np.searchsorted(own, time, side="right") - 1
+        return np.where(last < 0, np.nan, values[np.clip(last, 0, None)])
+    step = float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    after = np.clip(np.searchsorted(time, own), 1, len(time) - 1)
+    rows = np.where(own - time[after - 1] < time[after] - own, after - 1, after)
+    rows = np.unique(rows[np.abs(time[rows] - own) < step])
+    following = np.clip(np.searchsorted(own, time[rows]), 1, len(own) - 1)
+    known = own[following] - own[following - 1] < LONGEST * np.median(np.diff(own))
+    found = np.full(len(time), np.nan)
+    found[rows[known]] = np.interp(time[rows[known]], own, values)
+    return found
+
+
+def one_clock(log: Trajectory) -> Trajectory:
+    """The log on the rows of its fastest channel, of equally fast ones those of the commands, where
+    its rows belong to channels of several clocks; others are `placed` there. A log of one rate is
+    returned as it is."""
+    log = _joined_rows(log)
+    counts = {name: int(np.isfinite(log[name]).sum()) for name in log.names}
+    fast = [name for name in counts if counts[name] > FULL * max(counts.values())]
+    widest = max(fast, key=lambda name: (is_command(name), counts[name]), default="")
+    if not widest or not 2 < counts[widest] < FULL * len(log) or not np.all(np.diff(log.time) > 0):
+        return log
+    if not any(_elsewhere(log[widest], log[name]) for name in log.names):
+        return log  # rows are missing, no second clock
+    rows = np.isfinite(log[widest])
+    columns = {
+        header: placed(log.time[rows], log.time, log[name], is_command(name))
+        for header, name in zip(log.headers, log.names, strict=True)
+    }
+    slower = [name for name in log.names if _elsewhere(log[widest], log[name])]
+    said = merged(slower, float(np.median(np.diff(log.time[rows]))))
+    meta = {**log.meta, "read": [*log.meta.get("read", []), said]}
+    return Trajectory(log.time[rows], columns, meta)
+
+
+def merged(names: Collection[str], step: float) -> str:
+    """The sentence about channels that were put on another clock with rows `step` [s] apart."""
+    first = ", ".join(list(names)[:3])
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return (
+        f"{first}{more} have a clock of their own: their readings stand in the nearest of rows "
+        f"{1e3 * step:.3g} ms apart, empty between readings; commands are held"
+    )
+
+
+def _elsewhere(base: Array, other: Array) -> bool:
+    """Whether a column is mostly read where the base is not."""
+    read = np.isfinite(other)
+    return bool(read.any()) and float(np.mean(np.isnan(base[read]))) > 0.5
+
+
+def _joined_rows(log: Trajectory) -> Trajectory:
+    """The log with rows of one stamp as one, where none of its columns is read twice in them."""
+    steps = np.diff(log.time)
+    if not len(steps) or not np.all(steps >= 0) or not np.any(steps == 0):
+        return log
+    first = np.concatenate([[True], steps > 0])
+    row = np.cumsum(first) - 1
+    columns = {}
+    for header, name in zip(log.headers, log.names, strict=True):
+        good = np.isfinite(log[name])
+        if len(np.unique(row[good])) < good.sum():
+            return log
+        columns[header] = np.full(int(first.sum()), np.nan)
+        columns[header][row[good]] = log[name][good]
+    return Trajectory(log.time[first], columns, log.meta)
+
+
+def rate_missing(time: Array, values: Array) -> tuple[float, float]:
+    """The median distance [s] between the readings of a channel, and the share of readings that
+    are missing at that rate."""
+    good = np.isfinite(values) & np.isfinite(time)
+    if good.sum() < 2:
+        return np.inf, 1.0
+    step = float(np.median(np.diff(time[good])))
+    expected = 1.0 + (time[-1] - time[0]) / step if step > 0 else len(time)
+    return step, float(np.clip(1.0 - good.sum() / expected, 0.0, 1.0))

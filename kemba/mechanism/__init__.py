@@ -1,11 +1,16 @@
 """The robot as a mechanism: link table, pin.Model, symbolic dynamics, loop closure, ports."""
 
-from kemba.mechanism.bore import Bore
-from kemba.mechanism.cylinder import Cylinder
+from kemba.mechanism.cylinder import Bore, Cylinder
 from kemba.mechanism.links import Leg, Link, Piston, Robot
-from kemba.mechanism.own_rigs import CylinderRig, DriveRig, OwnRig, VesselRig, own_mechanism
+from kemba.mechanism.own_rigs import (
+    CylinderRig,
+    DriveRig,
+    OwnRig,
+    VesselRig,
+    own_mechanism,
+    rig_mechanism,
+)
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.rig import rig_mechanism
 from kemba.mechanism.robot import reshaped, robot_mechanism
 from kemba.mechanism.robot_file import load_cylinder, load_robot
 

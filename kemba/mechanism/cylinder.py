@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
 from pydantic import model_validator
 
 from kemba.config import Section
 from kemba.errors import KembaError
-from kemba.mechanism.bore import Bore, Diameter, Stroke
 from kemba.quantity import Param
+
+# A cylinder of a tenth of a millimetre or of ten metres is a mistake in the unit.
+Diameter = Annotated[float, Param("m", lower=1e-4, upper=1.0, doc="diameter")]
+Stroke = Annotated[float, Param("m", lower=1e-4, upper=10.0, doc="way of the rod")]
+
+
+class Bore(Section):
+    """Bore, rod and stroke [m]; the rod passes through the retract chamber."""
+
+    bore: Diameter
+    rod: float
+    stroke: Stroke
+
+    @property
+    def area_extend(self) -> float:
+        """Area [m2] on which the extend chamber pushes."""
+        return math.pi / 4 * self.bore**2
+
+    @property
+    def area_retract(self) -> float:
+        """Area [m2] on which the retract chamber pushes: of the bore less the rod."""
+        return math.pi / 4 * (self.bore**2 - self.rod**2)
+
 
 Volume = Annotated[float, Param("m3", lower=1e-9, doc="tubes and ports of one chamber")]
 Pascal = Annotated[float, Param("Pa", lower=0.0, doc="pressure of the supply")]

@@ -9,8 +9,12 @@ from pydantic import Field, field_validator
 
 from kemba.config import Section
 from kemba.mechanism.cylinder import Cylinder, CylinderTable
-from kemba.mechanism.table import Inertia, Length, Mass
 from kemba.quantity import Param
+
+Length = Annotated[float, Param("m", doc="length")]
+Mass = Annotated[float, Param("kg", lower=0.0, doc="mass")]
+Inertia = Annotated[float, Param("kg.m2", lower=0.0, doc="moment of inertia")]
+
 
 # part, as row/field of a leg in the link table: `femur/length` -> true minus nominal [m], a number
 # or a symbol

@@ -9,9 +9,9 @@ import casadi as ca
 from pydantic import Field, model_validator
 
 from kemba.config import Section
-from kemba.mechanism.bore import Bore
+from kemba.mechanism.cylinder import Bore, Cylinder
+from kemba.mechanism.links import Mass
 from kemba.mechanism.planar import Mechanism, Port
-from kemba.mechanism.table import Mass
 from kemba.quantity import Param, Quantity
 
 GRAVITY = 9.81  # m.s-2
@@ -158,5 +158,26 @@ def _one_axis(
         sign_speed=sign_speed,
         rig=kind,
         logged=logged,
+        imposed=True,
+    )
+
+
+def rig_mechanism(cylinder: Cylinder) -> Mechanism:
+    """A piston on the bench: one coordinate, its extension `piston/x` [m], massless."""
+    q, v, a = ca.SX.sym("q"), ca.SX.sym("v"), ca.SX.sym("a")
+    x = Quantity("piston/x", "m", 0.0, cylinder.stroke, 0.02, doc="piston extension, 0 retracted")
+    rate = Quantity("piston/v", "m.s-1", -5.0, 5.0, 0.5, doc="piston rate")
+    return Mechanism(
+        name="rig",
+        q=q,
+        v=v,
+        a=a,
+        coordinates=(x,),
+        velocities=(rate,),
+        inverse_dynamics=ca.SX.zeros(1),
+        ports={"piston/x": Port(x, rate, q)},
+        legs=("",),
+        gravity=0.0,  # nothing hangs on the rod
+        cylinder=cylinder,
         imposed=True,
     )

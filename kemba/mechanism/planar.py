@@ -9,8 +9,7 @@ from functools import cached_property
 import casadi as ca
 
 from kemba.errors import KembaError, suggest
-from kemba.mechanism.bore import Bore
-from kemba.mechanism.cylinder import Cylinder
+from kemba.mechanism.cylinder import Bore, Cylinder
 from kemba.mechanism.links import Robot
 from kemba.quantity import Quantity
 from kemba.scene import FLAT, POINTS, Scene

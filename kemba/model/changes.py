@@ -1,4 +1,4 @@
-"""Parameters of a model's effects that a task changes: `effects: {contact: {mu: 0.6}}`."""
+"""Models changed: numbers by name, or drawn at random."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kemba.config import Document, parse
 from kemba.effects import Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.errors import ConfigErrors, KembaError, listed_errors, suggest
-from kemba.model.spec import ModelSpec, load_spec
+from kemba.model.model import Model
+from kemba.model.spec import ModelSpec, load_spec, read_covariance
 
 Changes = Mapping[str, Mapping[str, Any]]
 
@@ -70,3 +73,42 @@ def _part(source: Document, key: str, effect: Effect, values: Mapping[str, Any])
     told = {p[2:]: text for p, text in source.overrides.items() if p[:2] == at}
     data = {**effect.model_dump(exclude_unset=True), "kind": effect.kind, **values}
     return Document(data, source.source, source.lines, kept, told)
+
+
+DRAWN = 40  # models: the spread is then known to a tenth
+
+
+def drawn_models(model: Model, name: str | Path, count: int = DRAWN, seed: int = 0) -> list[Model]:
+    """So many models drawn from the covariance of the model YAML `name` about `model`.
+
+    Parameters stay within their bounds. Raises KembaError where the covariance is missing or none.
+    """
+    names, covariance = read_covariance(name)
+    known = {e.name: e for e in model.effects}
+    middle = np.array([_value(known, n) for n in names])
+    size, axes = np.linalg.eigh(covariance)
+    root = axes * np.sqrt(np.maximum(size, 0.0))
+    steps = np.random.default_rng(seed).standard_normal((count, len(names))) @ root.T
+    return [_with(model, dict(zip(names, middle + step, strict=True))) for step in steps]
+
+
+def _value(known: Mapping[str, Effect], name: str) -> float:
+    effect, _, parameter = name.rpartition(".")
+    return float(known[effect].value(parameter)) if effect in known else 0.0
+
+
+def _with(model: Model, values: Mapping[str, float]) -> Model:
+    """The model with parameters changed, each within its bounds."""
+    effects = []
+    for effect in model.effects:
+        declared = effect.parameters()
+        own = {}
+        for name, value in values.items():
+            owner, _, parameter = name.rpartition(".")
+            if owner == effect.name:
+                bounds = declared.get(parameter)
+                own[parameter] = (
+                    float(np.clip(value, bounds.lower, bounds.upper)) if bounds else value
+                )
+        effects.append(effect.bind(own) if own else effect)
+    return Model(model.mechanism, effects, model.supply, model.name)

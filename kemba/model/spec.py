@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -12,14 +13,46 @@ from kemba.config import Document, Section, find_config, is_file, load_yaml, par
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.pneumatics.gas import VesselChamber
+from kemba.effects.rigs.axis import DriveAxis
+from kemba.effects.rigs.chambers import MeasuredChambers
 from kemba.errors import KembaError
-from kemba.mechanism import OwnRig, load_robot, rig_mechanism, robot_mechanism
+from kemba.mechanism import (
+    CylinderRig,
+    DriveRig,
+    OwnRig,
+    VesselRig,
+    load_robot,
+    own_mechanism,
+    rig_mechanism,
+    robot_mechanism,
+)
 from kemba.mechanism.robot_file import find_file, robot_files
 from kemba.model.evidence import Array, Evidence, located, matrix_in
 from kemba.model.model import Model
-from kemba.model.own_rig import own_model
 from kemba.quantity import Param
 from kemba.scene import FLAT, Scene
+
+
+def own_model(
+    rig: CylinderRig | DriveRig | VesselRig, effects: Iterable[Effect] = (), name: str = "rig"
+) -> Model:
+    """The rig with its own physics and `effects`; one of the same name replaces it."""
+    listed = {e.name: e for e in (brought_along(rig), *effects)}
+    return Model(own_mechanism(rig), listed.values(), name=name)
+
+
+def brought_along(rig: CylinderRig | DriveRig | VesselRig) -> Effect:
+    """The physics that every rig of this kind has."""
+    if isinstance(rig, CylinderRig):
+        return MeasuredChambers(chambers=rig.chambers, travel=rig.stretch)
+    if isinstance(rig, DriveRig):
+        load, arm = (rig.load.mass, rig.load.arm) if rig.load else (0.0, None)
+        return DriveAxis(J=rig.inertia, m=load, arm=arm or 0.0, hangs=arm is not None)
+    opening = math.pi / 4 * rig.orifice**2 * rig.discharge
+    figures = {"ambient": rig.ambient, "outside": rig.outside}
+    return VesselChamber(V=rig.volume, a=opening, wall=rig.area, **figures)
+
 
 Supply = Annotated[float, Param("Pa", 0.1e6, lower=ATMOSPHERE, doc="supply pressure")]
 

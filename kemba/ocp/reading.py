@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from kemba.config import Document, apply_overrides, find_config, load_yaml
-from kemba.config.sound import sound
+from kemba.config.parsing import sound
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import ConfigErrors, KembaError, listed_errors
 from kemba.model import Model, load_model

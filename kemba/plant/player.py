@@ -27,7 +27,7 @@ from kemba.plant.kernel.machine import Array, memory, state
 from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Law, Marks, NextMark, play
 from kemba.plant.kernel.settings import StepLength
 from kemba.plant.kernel.step import Pace
-from kemba.plant.simulate import Impact, recorded
+from kemba.plant.record import Impact, recorded
 
 SMALLER = "try a smaller step, or look for a start that is impossible"
 ROOM = 8 * MOST  # impacts kept in the kernel before they are fetched

@@ -21,10 +21,11 @@ from kemba.mechanism import load_robot
 from kemba.model import Model, build_model, load_model, load_spec
 from kemba.model.changes import changed_effects
 from kemba.model.spec import ModelSpec, own_robot
+from kemba.plant.certificate import PLANT
 from kemba.plant.commands import scattered
 from kemba.plant.controller import Execution, Gains, execute, read_controller
 from kemba.plant.kernel.machine import Array
-from kemba.plant.replay import PLANT, Replay
+from kemba.plant.replay import Replay
 from kemba.quantity import to_si
 from kemba.scene import FLAT, Scene, scene_in
 from kemba.stopwatch import Stage, Tell, silent

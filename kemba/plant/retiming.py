@@ -17,9 +17,10 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.events import PLANNED, read
 from kemba.model import Model
+from kemba.plant.certificate import begins_moving, moving_start, rest_after
 from kemba.plant.controller import execute
 from kemba.plant.kernel.machine import Array
-from kemba.plant.replay import Replay, begins_moving, moving_start, rest_after
+from kemba.plant.replay import Replay
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 

@@ -1,4 +1,4 @@
-"""Bench rigs: a cylinder, an axis or a chamber whose motion is imposed or free, and logs of them."""
+"""The paper's bench rigs: what they impose on a piston, from YAML, and their logs."""
 
 from __future__ import annotations
 
@@ -269,7 +269,7 @@ class DynamometerRig(Rig):
         u_e, u_r = VALVES[mode]
         valves = {"valve/extend": Profile.constant(u_e), "valve/retract": Profile.constant(u_r)}
         begin, end, sign = (way, 0.0, -1.0) if mode == "retract" else (0.0, way, 1.0)
-        motion = steady_stroke(begin, sign * speed, self.settle, self.ramp, end)
+        motion = stroke(begin, sign * speed, self.settle, self.ramp, end)
         times = self.clock(self.settle + self.ramp + way / speed)
         name = f"{mode}-{1e3 * speed:.0f}mms-{supply / 1e6:.1f}MPa-{number}"
         return Test(name, supply, motion, valves, times, {"test": "dynamometer", "mode": mode})

@@ -17,10 +17,10 @@ import numpy as np
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.plant.commands import SAME_TIME, Commands, delayed
-from kemba.plant.equations import Equations, equations_of, share_equations
+from kemba.plant.equations import equations_of, share_equations
 from kemba.plant.kernel.machine import Array
 from kemba.plant.kernel.settings import StepLength
-from kemba.quantity import Quantity
+from kemba.plant.record import Impact, trajectory
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
@@ -99,34 +99,6 @@ def _knee(model: Model, piston: str, knee: str, x: float) -> float:
         if abs(now - x) < settings.place:
             return angle
     raise KembaError("initial", f"{piston} = {x:g} m cannot be reached")
-
-
-@dataclass(frozen=True)
-class Impact:
-    """An inelastic impact: when [s], at which pairs, its largest impulse [N.s], the kinetic
-    energy lost [J], and how fast the gap of each pair was closing before [m/s]."""
-
-    time: float
-    labels: tuple[str, ...]
-    impulse: float
-    lost: float
-    speeds: tuple[float, ...]
-
-
-def recorded(model: Model, equations: Equations) -> list[Quantity]:
-    """What a row of the record holds: states, inputs as sent, forces, outputs."""
-    mechanism = model.mechanism
-    listed = {q.name: q for q in mechanism.coordinates + mechanism.velocities}
-    sources = [*listed.values(), *model.states.values(), *model.inputs.values()]
-    return [*sources, *model.forces.values(), *equations.node.output_quantities]
-
-
-def trajectory(model: Model, equations: Equations, times: Array, table: Array) -> Trajectory:
-    """The record (m, columns) as a trajectory; a column named twice is written once."""
-    columns: dict[str, Array] = {}
-    for i, quantity in enumerate(recorded(model, equations)):
-        columns.setdefault(quantity.header, table[:, i].copy())
-    return Trajectory(times, columns)
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from kemba.plotting.bands import Band, plot_bands, plot_ladder
-    from kemba.plotting.choice import draw
-    from kemba.plotting.heat import plot_heat_map
-    from kemba.plotting.rig.bench import plot_bench, plot_force_velocity, valve_modes
-    from kemba.plotting.rig.rig import bench_logs, plot_rig
-    from kemba.plotting.robot.animation import animate, save_animation
-    from kemba.plotting.robot.machine import Machine, load_machine, machine_of
-    from kemba.plotting.robot.motion import plot_motion
-    from kemba.plotting.source import Source, default_path, load_source, load_sources
-    from kemba.plotting.study.robustness import plot_growth, plot_robustness
+    from kemba.plotting.comparison import Band, plot_bands, plot_heat_map, plot_ladder
+    from kemba.plotting.motion import (
+        draw,
+        plot_bench,
+        plot_force_velocity,
+        plot_motion,
+        valve_modes,
+    )
+    from kemba.plotting.rig import bench_logs, plot_rig
+    from kemba.plotting.source import (
+        Machine,
+        Source,
+        default_path,
+        load_machine,
+        load_source,
+        load_sources,
+        machine_of,
+    )
+    from kemba.plotting.sticks import animate, save_animation
+    from kemba.plotting.studies import plot_growth, plot_robustness
     from kemba.plotting.style import paper_figure, paper_style, save_figure, svg_text
 
 __all__ = [
@@ -54,16 +64,13 @@ __all__ = [
 ]
 
 _HOMES = {  # module -> names that it offers
-    "kemba.plotting.bands": "Band plot_bands plot_ladder",
-    "kemba.plotting.choice": "draw",
-    "kemba.plotting.heat": "plot_heat_map",
-    "kemba.plotting.rig.bench": "plot_bench plot_force_velocity valve_modes",
-    "kemba.plotting.rig.rig": "bench_logs plot_rig",
-    "kemba.plotting.robot.animation": "animate save_animation",
-    "kemba.plotting.robot.machine": "Machine load_machine machine_of",
-    "kemba.plotting.robot.motion": "plot_motion",
-    "kemba.plotting.source": "Source default_path load_source load_sources",
-    "kemba.plotting.study.robustness": "plot_growth plot_robustness",
+    "kemba.plotting.comparison": "Band plot_bands plot_ladder plot_heat_map",
+    "kemba.plotting.motion": "draw plot_bench plot_force_velocity valve_modes plot_motion",
+    "kemba.plotting.rig": "bench_logs plot_rig",
+    "kemba.plotting.sticks": "animate save_animation",
+    "kemba.plotting.source": "Machine load_machine machine_of "
+    "Source default_path load_source load_sources",
+    "kemba.plotting.studies": "plot_growth plot_robustness",
     "kemba.plotting.style": "paper_figure paper_style save_figure svg_text",
 }
 

@@ -13,9 +13,8 @@ from kemba.plant.commands import Commands
 from kemba.plant.controller import PERIOD, Execution, condition_of, later, read_controller
 from kemba.plant.repeat import VALVE_SCATTER, Play, Sensors
 from kemba.plant.simulate import simulate_one
-from kemba.policy.modes import Array
+from kemba.policy.modes import FINE, Array
 from kemba.policy.player import Policy
-from kemba.policy.settings import FINE
 from kemba.trajectory import Trajectory
 
 

@@ -13,6 +13,7 @@ from kemba.model import Model
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import Constraint, read_constraints
+from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -207,3 +208,112 @@ def _spread(lam: ca.SX, constraints: Sequence[Constraint], push: ca.SX) -> ca.SX
         if c.friction is not None:
             found[c.friction.forward] += push[2 * i + 1]
     return found
+
+
+@dataclass(frozen=True)
+class Flow:
+    """A stretch of time in one mode: when it begins and ends [s], its map of (x, torques)."""
+
+    begin: float
+    end: float
+    map: Array  # (n + m, n + m)
+
+
+@dataclass(frozen=True)
+class Tick:
+    """The controller acts: torques = hold (m, n) x + what a policy adds. `tick`: its row."""
+
+    time: float
+    tick: int
+    hold: Array
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A valve switches: `late` (n,) is the change of x per second by which it comes later.
+
+    `valve`: its column; `index`: which of its edges; `sent`: the tick at which it is sent.
+    """
+
+    time: float
+    valve: str
+    index: int
+    sent: int
+    late: Array
+
+
+@dataclass(frozen=True)
+class Saltation:
+    """A touchdown or a stop: the saltation matrix (n, n)."""
+
+    time: float
+    saltation: Array
+
+
+Event = Flow | Tick | Edge | Saltation
+
+
+@dataclass(frozen=True)
+class EventCourse:
+    """An executed table and its events in order; `motion` has a row at every tick."""
+
+    hybrid: Hybrid
+    table: Trajectory
+    motion: Trajectory
+    states: Array  # (ticks, n)
+    events: tuple[Event, ...]
+    joints: tuple[str, ...]
+
+    def map(self, begin: float, end: float) -> Array:
+        """The slope (n, n) of the state at `end` [s] by the state at `begin` [s], no policy."""
+        n, m = self.hybrid.size, len(self.joints)
+        found = np.eye(n + m)
+        for event in self.events:
+            time = event.begin if isinstance(event, Flow) else event.time
+            if begin - 1e-9 <= time < end - 1e-9:
+                found = plain(event, n, m) @ found
+        return found[:n, :n]
+
+
+def plain(event: Event, n: int, m: int) -> Array:
+    """The map of (x, torques) through an event without a policy."""
+    whole = np.eye(n + m)
+    if isinstance(event, Flow):
+        return event.map
+    if isinstance(event, Tick):
+        whole[n:, :n], whole[n:, n:] = event.hold, 0.0
+    elif isinstance(event, Saltation):
+        whole[:n, :n] = event.saltation
+    return whole
+
+
+class PolicySettings(Settings):
+    """How far a policy may go."""
+
+    latest: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
+    added: float = setting(5.0, "N.m", "torque that is added at most", CHOSEN, decides=True)
+
+
+# deviations and corrections that cost the same: of the body's place [m], velocity [m/s], pitch
+# [rad] and its rate [rad/s], of a hip or knee [rad] and its rate [rad/s]
+PLACE, SPEED, PITCH, PITCH_RATE, JOINT, JOINT_RATE = 0.01, 0.1, 0.01, 0.1, 0.05, 2.0
+TORQUE, EDGE = (
+    2.0,
+    3e-3,
+)  # the same: torque that is added [N.m], time by which a valve edge moves [s]
+FADING = 0.1  # s; stage costs of this long count as much as those at the end
+WINDOW = 8  # ticks, over which rates are estimated
+# ticks before and after touchdown in which no torque is added: feet that touch a little sooner or
+# later have quite other velocities
+BLIND = 10
+# executions from which it is learnt what to expect; of fewer nothing is learnt: more than the 14
+# deviations and rates that are weighed
+FEWEST = 20
+FINE = 4  # instants a tick at which valves of the simulated robot may act
+
+# how the events along an executed table are found
+CLOSING = 1e-6  # m/s; a gap that closes more slowly touches without an impact
+SAME = 1e-8  # s; switches nearer than this are one
+BESIDE = 2e-5  # s; states are read this far from an impact: other samples move it by up to 10 us
+FINER = 20  # rows within a step in which a foot leaves the ground or begins to slide
+PASSES = 3  # simulations in which the samples beside impacts find their place

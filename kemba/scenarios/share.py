@@ -10,12 +10,19 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute_many
-from kemba.plant.replay import rest_after
 from kemba.scenarios.conditions import standing
 from kemba.scenarios.draw import Scenario
-from kemba.scenarios.rate import wilson
 from kemba.trajectory import Trajectory
+
+
+def wilson(successes: int, cases: int) -> tuple[float, float]:
+    """The 95 % Wilson interval of a success rate."""
+    from statsmodels.stats.proportion import proportion_confint
+
+    low, high = proportion_confint(successes, cases, alpha=0.05, method="wilson")
+    return float(low), float(high)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,6 @@
 """What the robot moves in: the ground, its friction, and obstacles."""
 
-from kemba.scene.ground import Ground
-from kemba.scene.obstacles import Obstacle
-from kemba.scene.scene import FLAT, POINTS, Scene, scene_in
+from kemba.scene.scene import FLAT, POINTS, Ground, Obstacle, Scene, scene_in
 from kemba.scene.terrain import AnyTerrain
 
 __all__ = [

@@ -11,8 +11,9 @@ import numpy as np
 from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.asked import MeasuredRequirement, on_execution
+from kemba.plant.certificate import executions, plant_run, summaries
 from kemba.plant.repeat import counterpart
-from kemba.plant.replay import Replay, executions, plant_run, summaries
+from kemba.plant.replay import Replay
 from kemba.plant.retiming import ExecutedTable, retimed
 from kemba.plant.strides import Stability, stability
 from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of

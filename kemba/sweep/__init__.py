@@ -1,12 +1,9 @@
 """Sweeps: many tasks to plan, or many executions of one plan, on Dask."""
 
-from kemba.sweep.cases.blocks import expand
-from kemba.sweep.cases.case import Case
-from kemba.sweep.cases.expand import load_sweep
-from kemba.sweep.cases.schema import Sweep
-from kemba.sweep.table.results import open_folder, write_results
-from kemba.sweep.workers.farm import check_scheduler, run_cases
-from kemba.sweep.workers.machine import machine
+from kemba.sweep.cases import Case, Sweep, load_sweep
+from kemba.sweep.execution import expand
+from kemba.sweep.farm import check_scheduler, machine, run_cases
+from kemba.sweep.results import open_folder, write_results
 
 __all__ = [
     "Case",

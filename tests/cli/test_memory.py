@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from kemba_cli.memory import NEEDED, shortage, used_up
+from kemba_cli.failures import NEEDED, shortage, used_up
 
 resource = pytest.importorskip("resource")
 COMMAND = [sys.executable, "-c", "from kemba_cli.main import main; main()"]

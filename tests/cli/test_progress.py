@@ -7,9 +7,19 @@ import re
 import pytest
 
 from kemba.stopwatch import Stage
-from kemba_cli import course as courses
-from kemba_cli.course import COMPARE, DISCOVER, LEARN, NEAR, REVIEW, SOLVE, Left, duration, span
-from kemba_cli.progress import Progress
+from kemba_cli import progress as courses
+from kemba_cli.progress import (
+    COMPARE,
+    DISCOVER,
+    LEARN,
+    NEAR,
+    REVIEW,
+    SOLVE,
+    Left,
+    Progress,
+    duration,
+    span,
+)
 
 
 class Clock:

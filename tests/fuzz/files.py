@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fuzz.values import anything, numbers, texts
 from kemba.config import load_yaml, shipped_configs
-from kemba.config.writer import dump_text
+from kemba.config.document import dump_text
 from kemba_cli.schemas import SCHEMAS, schema_of
 
 Data = Any

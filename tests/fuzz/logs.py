@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from fuzz.values import NUMBERS, anything
-from kemba.config.writer import dump_text
+from kemba.config.document import dump_text
 from kemba.trajectory import Trajectory
 
 Draw = Callable[[st.SearchStrategy[Any]], Any]

@@ -18,7 +18,7 @@ from kemba.identify.bench.missing import lagged
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.model.spec import load_model
-from kemba.plotting.study.comparison import plot_comparison
+from kemba.plotting.comparison import plot_comparison
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

@@ -17,7 +17,7 @@ from kemba.identify.evidence.search import Search
 from kemba.identify.evidence.spike_slab import NULL, SpikeSlabSettings, probabilities
 from kemba.identify.ranking import values
 from kemba.identify.verdict import doubts_about, verdict_on
-from kemba.plotting.study.discovery import plot_steps
+from kemba.plotting.studies import plot_steps
 
 
 def test_the_right_effect_is_named_with_its_value() -> None:

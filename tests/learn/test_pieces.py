@@ -16,20 +16,20 @@ from kemba.identify.answer import Answer
 from kemba.learn.correction import (
     Correction,
     CorrectionSettings,
+    FlownJump,
     correction_from,
+    flight_of,
     scatter_of,
     write_correction,
 )
-from kemba.learn.expected import ExpectedApex, band_about
-from kemba.learn.flight import FlownJump, flight_of
+from kemba.learn.outcome import ExpectedApex, band_about
 from kemba.learn.page import verdict_of
-from kemba.learn.round import Round
-from kemba.learn.rounds import as_executed, entry, past_of, sent
+from kemba.learn.round import Round, as_executed, entry, past_of, sent
 from kemba.model import load_model
-from kemba.model.drawn import drawn_models
+from kemba.model.changes import drawn_models
 from kemba.model.evidence import write_covariance
 from kemba.ocp import load_task
-from kemba.plotting.robot.machine import load_machine
+from kemba.plotting.source import load_machine
 from kemba.trajectory import Trajectory
 
 

@@ -12,9 +12,8 @@ from typer.testing import CliRunner, Result
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import needed, read_log
 from kemba.logs import ColumnMap, ColumnSource, load_map
-from kemba.logs.draft.draft import draft_map
-from kemba.logs.draft.layout import layout_of
-from kemba.logs.draft.targets import bench_targets, robot_targets
+from kemba.logs.draft.draft import draft_map, layout_of
+from kemba.logs.draft.matching import bench_targets, robot_targets
 from kemba.logs.draft.words import meaning, named_unit
 from kemba_cli.main import app
 

@@ -19,8 +19,8 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map
-from kemba.logs.formats.decoding import Topic
-from kemba.logs.opening import raw_columns
+from kemba.logs.foreign import raw_columns
+from kemba.logs.formats.mcap import Topic
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from kemba.config import load_yaml
-from kemba.config.sound import sound
+from kemba.config.parsing import sound
 from kemba.errors import ConfigErrors
 from kemba.ocp import Task, load_task
 from kemba.ocp.reading import asked_of

@@ -11,8 +11,9 @@ import pytest
 from kemba.model import Model, load_model
 from kemba.ocp.chain import joined
 from kemba.ocp.controller import controller_table
+from kemba.plant.certificate import begins_moving, executions, moving_start
 from kemba.plant.commands import Commands, Profile
-from kemba.plant.replay import Replay, begins_moving, executions, first_row, moving_start, replay
+from kemba.plant.replay import Replay, first_row, replay
 from kemba.plant.simulate import run
 from kemba.plant.strides import kept, multipliers
 from kemba.trajectory import Trajectory

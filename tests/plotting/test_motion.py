@@ -20,7 +20,7 @@ from kemba.plotting import (
     plot_motion,
     save_figure,
 )
-from kemba.plotting.robot.machine import stance_spans
+from kemba.plotting.source import stance_spans
 from kemba.trajectory import Trajectory
 
 LABELS = {

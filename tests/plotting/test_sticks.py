@@ -9,7 +9,7 @@ from PIL import Image
 
 from kemba.errors import KembaError
 from kemba.plotting import Machine, Source, animate, save_animation
-from kemba.plotting.robot.poses import poses
+from kemba.plotting.source import poses
 
 
 def distance(points: dict[str, np.ndarray], start: str, end: str) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.policy.expected import Expected, expected_from
-from kemba.policy.settings import WINDOW
+from kemba.policy.modes import WINDOW
+from kemba.policy.write import Expected, expected_from
 from kemba.trajectory import Trajectory
 
 CLOCK = np.arange(60) * 1e-3

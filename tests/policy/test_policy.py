@@ -16,11 +16,10 @@ from kemba.plant.commands import Profile
 from kemba.plant.repeat import Sensors
 from kemba.policy import player
 from kemba.policy.course import course_of
-from kemba.policy.events import Edge, EventCourse, Saltation
 from kemba.policy.execute import execute_policy
-from kemba.policy.gains import gains_of
+from kemba.policy.modes import Edge, EventCourse, Saltation
 from kemba.policy.player import Policy
-from kemba.policy.write import measured, policy_arrays, write_policy
+from kemba.policy.write import gains_of, measured, policy_arrays, write_policy
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

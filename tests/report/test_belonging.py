@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from kemba.report.review.belonging import doubt, other_commands, own_run, strangers
+from kemba.report.review import doubt, other_commands, own_run, strangers
 from kemba.runs import Run, load_run
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app

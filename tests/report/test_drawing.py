@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.report.drawing import FIGURE, Beside, Here, drawer
+from kemba.report.solving import FIGURE, Beside, Here, drawer
 from kemba.trajectory import Trajectory
 
 

@@ -16,7 +16,7 @@ from kemba.config import shipped_configs
 from kemba.identify.logs.reading import read_log
 from kemba.logs import load_map
 from kemba.plotting import load_source
-from kemba.report.stage import scene, script_text, stage
+from kemba.report.view import scene, script_text, stage
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 

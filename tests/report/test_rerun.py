@@ -12,7 +12,7 @@ from foreign_files import robot_log
 
 from kemba.errors import KembaError
 from kemba.plotting.source import Source
-from kemba.report.rerun_file import write_rerun
+from kemba.report.view import write_rerun
 from kemba.trajectory import Trajectory
 
 

@@ -18,12 +18,12 @@ from kemba.identify.answer import ENDED, read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.mechanism import load_robot
 from kemba.plotting import Source, load_machine
-from kemba.report.review.events import Events, events_of
-from kemba.report.review.lacking.found import answer_parts
-from kemba.report.review.limits.summary import event_table
-from kemba.report.review.limits.use import air_drawn, motor_share, supply_share
-from kemba.report.review.tracks import Track, gather, grid_of, on_grid
-from kemba.report.review.verdict import of_answer, of_logs, of_plan
+from kemba.report.charts import Track, gather, grid_of, on_grid
+from kemba.report.limits import event_table
+from kemba.report.model_error import answer_parts
+from kemba.report.motion import Events, events_of
+from kemba.report.use import air_drawn, motor_share, supply_share
+from kemba.report.verdict import of_answer, of_logs, of_plan
 from kemba.runs import PLANT_RUN, load_run, newest_run
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
@@ -324,7 +324,7 @@ def test_folders_are_taken_for_what_they_hold(jump: Path, tmp_path: Path) -> Non
 def test_a_page_takes_no_library_that_it_does_not_need() -> None:
     """`scipy.signal` and `scipy.stats` take half a second each."""
     code = (
-        "import sys, kemba.report.review.page;"
+        "import sys, kemba.report.review;"
         "heavy = {'matplotlib', 'scipy.stats', 'scipy.signal', 'dask', 'pandas', 'numba'};"
         "print(sorted(heavy & set(sys.modules)))"
     )

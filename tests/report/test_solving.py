@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 from kemba.files import WriteError
 from kemba.ocp import load_task, task_model
 from kemba.plant import execute, replay
+from kemba.plant.certificate import SETTLE
 from kemba.plant.repeat import counterpart
-from kemba.plant.replay import SETTLE
 from kemba.report import solve_into
 from kemba.runs import RunFolder
 from kemba.solve import Approach, Listener

@@ -27,7 +27,7 @@ ALLOWED = {
     "kemba/plant/repeat.py",
     "kemba/identify/written/quoted.py",
     "kemba/solve/truth.py",
-    "cli/verbs/inspect/check.py",
+    "cli/verbs/check.py",
     "cli/schemas.py",
 }
 

@@ -16,7 +16,7 @@ from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
 from kemba.ocp.infeasibility.flight import inertia_and_weight, leg_swing
 from kemba.plant.repeat import another_robot, counterpart
-from kemba.sweep.cases.expand import model_hash
+from kemba.sweep.cases import model_hash
 
 FEMUR = "mass: 0.335 kg"
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from kemba.scenarios.sampling import drawn, sample
-from kemba.scenarios.schema import Spread
-from kemba.sweep.cases.schema import SolveBlock
+from kemba.scenarios.conditions import Spread
+from kemba.scenarios.draw import drawn, sample
+from kemba.sweep.cases import SolveBlock
 from kemba.units import read_si
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from kemba.files import read_json, write_json
-from kemba.sweep.cases.case import Case, content_hash, perform
+from kemba.sweep.cases import Case, content_hash, perform
 
 WORK = {"task": {"height": "0.5 m", "nodes": 40}, "model": "planning"}
 DONE = {"status": "solved", "good": True, "sentence": "solved"}

@@ -9,10 +9,9 @@ import pytest
 from kemba.config import Document
 from kemba.errors import KembaError
 from kemba.files import read_json
-from kemba.scenarios.rate import wilson
+from kemba.scenarios.share import wilson
 from kemba.sweep import Case, Sweep, open_folder, write_results
-from kemba.sweep.table.influence import costliest, influence
-from kemba.sweep.table.summary import summarise
+from kemba.sweep.results import costliest, influence, summarise
 
 SPREAD = {"low": "0.4 m", "high": "0.6 m"}
 

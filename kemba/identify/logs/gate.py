@@ -14,7 +14,7 @@ from kemba.identify.logs.own_rigs import own_faults
 from kemba.identify.logs.reading import OWN_RIGS, legs_of, needed
 from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.problem.noise import difference_sigma
-from kemba.logs.rates import rate_missing
+from kemba.logs.times import rate_missing
 from kemba.trajectory import TIME, Array, Trajectory
 
 

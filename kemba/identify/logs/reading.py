@@ -13,7 +13,7 @@ from kemba.identify.logs.settings import GateSettings, range_of
 from kemba.identify.logs.sidecar import check_kind, check_noise
 from kemba.logs import ColumnMap, open_log
 from kemba.logs.foreign import unwrapped, wraps
-from kemba.logs.rates import one_clock
+from kemba.logs.times import one_clock
 from kemba.mechanism import Mechanism
 from kemba.trajectory import Array, Trajectory, sidecar
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kemba.logs import times
-from kemba.logs.draft import ranges
+from kemba.logs.draft import matching
 from kemba.logs.draft.words import Names, named_unit, says_time, words
 from kemba.logs.recording import Raw
 from kemba.logs.text import as_numbers
@@ -155,7 +155,7 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
     if called is None:
         return None
     score, reason = called
-    unit = stated or ranges.time_unit(rows[np.isfinite(rows)])
+    unit = stated or matching.time_unit(rows[np.isfinite(rows)])
     exact = raw[name] if raw[name].dtype.kind in "iu" else rows
     seconds = convert(np.asarray(exact - exact[0], dtype=float), unit, "s")
     from_first = abs(convert(float(rows[np.isfinite(rows)][0]), unit, "s")) > STAMPED

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,23 +15,122 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap
-from kemba.logs.draft import ranges
+from kemba.logs.draft import matching
 from kemba.logs.draft.clock import joint_state_labels, numbers, stamp_of, switches
-from kemba.logs.draft.frames import quaternions, upright
-from kemba.logs.draft.layout import Layout, layout_of, units_below
-from kemba.logs.draft.matching import Assigned, assigned
-from kemba.logs.draft.targets import (
+from kemba.logs.draft.matching import (
+    Assigned,
     Target,
+    assigned,
     bench_targets,
     drive_targets,
     rig_targets,
     robot_targets,
 )
-from kemba.logs.draft.words import SPELT, Names, is_unit, strange_unit
-from kemba.logs.foreign import wraps
-from kemba.logs.opening import TEXTS, held, raw_columns
+from kemba.logs.draft.words import SPELT, Names, is_unit, quaternions, strange_unit, upright
+from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
 from kemba.logs.recording import Recording
+from kemba.logs.text import cells_of, encoding, joined
 from kemba.trajectory import TIME, Array
+
+LINES = 300  # as many are looked at; a table that changes later is told when it is read
+NEARLY = 0.8  # share of the most numbers that a way to read a table must give
+SEPARATORS = (";", "tab", ",", "|", "whitespace")
+WAYS = [(mark, sign) for mark in SEPARATORS for sign in (".", ",") if mark != sign]
+NUMBER = {
+    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
+    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"),
+}
+Layout = dict[str, Any]
+
+
+def layout_of(path: Path) -> Layout:
+    """Keys of a column map that say how to read the table; those with their default are left out.
+
+    Of all separators and decimal signs that give about the most numbers, one that gives a name to
+    each column too, and then the one that gives most. Raises KembaError where none gives a table of
+    at least two columns.
+    """
+    lines = _lines(path)
+    found = [(_numbers(lines, *way), way) for way in WAYS]
+    most = max(score for (score, _, _), _ in found)
+    (score, begin, width), (separator, decimal) = max(
+        (way for way in found if way[0][0] >= NEARLY * most),
+        key=lambda way: (_header(lines[: way[0][1]], way[1][0], way[0][2])[1] > 0, way[0][0]),
+    )
+    if not score or width < 2:
+        expected = "rows of at least two numbers were expected"
+        raise KembaError(str(path), "is no table that kemba recognises", expected)
+    header, rows = _header(lines[:begin], separator, width)
+    layout: Layout = {} if separator == "," else {"separator": separator}
+    layout |= {} if decimal == "." else {"decimal": decimal}
+    above = header if rows else begin
+    below = sum(bool(line.strip()) for line in lines[header + rows : begin]) if rows else 0
+    layout |= {"skip_rows": above} if above else {}
+    layout |= {"skip_below": below} if below else {}
+    return layout | ({} if rows == 1 else {"header": rows or False})
+
+
+def units_below(path: Path, layout: Layout) -> list[str]:
+    """The cells of the row below the header, if it is no data: often the columns' units."""
+    if not layout.get("skip_below"):
+        return []
+    below = _lines(path)[layout.get("skip_rows", 0) + int(layout.get("header", 1)) :]
+    first = next((line for line in below if line.strip()), "")
+    return [cell.strip("[]() ") for cell in cells_of(first, layout.get("separator", ","))]
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        with open(path, encoding=encoding(path), newline=None, errors="replace") as stream:
+            return [line.rstrip("\n") for line in islice(stream, LINES)]
+    except OSError as error:
+        raise KembaError(str(path), error.strerror or str(error)) from None
+
+
+def _numbers(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int]:
+    """How many numbers the rows of the table hold, its first line, and its columns."""
+    rows = []
+    for number, line in enumerate(lines):
+        if line.strip():
+            cells = cells_of(line, separator)
+            rows.append((number, len(cells), _count(cells, decimal)))
+    numeric = [(number, width, count) for number, width, count in rows if count >= 2]
+    if not numeric:
+        return 0, 0, 0
+    width = Counter(width for _, width, _ in numeric).most_common(1)[0][0]
+    table = [(number, count) for number, other, count in numeric if other == width]
+    return sum(count for _, count in table), table[0][0], width
+
+
+def _count(cells: Sequence[str], decimal: str) -> int:
+    return sum(bool(NUMBER[decimal].fullmatch(cell)) for cell in cells)
+
+
+def _header(above: list[str], separator: str, width: int) -> tuple[int, int]:
+    """The line that names the columns, and how many rows it has; 0 of a table without header.
+
+    Of the lines above the numbers that are as wide: the one of most different names, the first of
+    equal ones; with the lines above it where names repeat and these tell them apart.
+    """
+    rows = {i: cells_of(line, separator) for i, line in enumerate(above) if line.strip()}
+    wide = [i for i, cells in rows.items() if _wide(cells, width)]
+    if not wide:
+        return 0, 0
+    best = max(wide, key=lambda i: (_different(rows[i]), -i))
+    for first in reversed([i for i in wide if i < best]):
+        together = joined([rows[i] for i in wide if first <= i <= best])
+        if _different(together) > _different(rows[best]) and best - first < len(wide):
+            return first, best - first + 1
+    return best, 1
+
+
+def _wide(cells: Sequence[str], width: int) -> bool:
+    """Whether a line has a name for each column; the last may end in an empty cell."""
+    return len(cells) == width or (len(cells) == width - 1 and all(cells))
+
+
+def _different(cells: Sequence[str]) -> int:
+    return len({cell for cell in cells if cell})
 
 
 @dataclass(frozen=True)
@@ -171,7 +272,7 @@ def _sources(
         name = found.pairs.get(target.header)
         if name is None:
             continue
-        unit = names.unit(name) or guessed.get(ranges.alike(target.header))
+        unit = names.unit(name) or guessed.get(matching.alike(target.header))
         if name in turned:
             columns[target.header] = {"source": list(turned[name])}
         else:
@@ -191,7 +292,7 @@ def _asked(target: Target, name: str, unit: str | None, names: Names, y: Array) 
     if "desired" in names.says(name).get("role", ()) and not target.is_command:
         found.append(f"{target.header}: '{name}' is what was asked for; which column is measured?")
     turns = target.header == "axis/q [rad]" and names.unit(name) is None
-    if turns and float(np.nanmax(np.abs(y), initial=0.0)) > dict(ranges.ANGLE)["rad"]:
+    if turns and float(np.nanmax(np.abs(y), initial=0.0)) > dict(matching.ANGLE)["rad"]:
         found.append(f"{target.header}: '{name}' has no unit, and may be degrees or several turns")
     return found
 
@@ -207,17 +308,17 @@ def _guessed_units(
     log, else by the size of all together, since a jump on the spot has small `x` and pitch. Of
     lengths the height tells most: a way forward may be any."""
     found: dict[str, str] = {}
-    for group in {ranges.alike(header) for header in pairs}:
+    for group in {matching.alike(header) for header in pairs}:
         own = {
             header: name
             for header, name in pairs.items()
-            if ranges.alike(header) == group and "valve/" not in header and name not in turned
+            if matching.alike(header) == group and "valve/" not in header and name not in turned
         }
         told = {names.unit(name) for name in own.values()} - {None}
         sized = {h: n for h, n in own.items() if h == "body/z [m]"} or own
         size = np.concatenate([values[name] for name in sized.values()] or [np.zeros(0)])
         header = next(iter(own), "[1]")
-        unit = told.pop() if len(told) == 1 else ranges.guessed_unit(header, size, stroke)
+        unit = told.pop() if len(told) == 1 else matching.guessed_unit(header, size, stroke)
         if unit is not None:
             found[group] = unit
     return found
@@ -240,13 +341,13 @@ def _share_level(
 def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[str, Any]:
     source: dict[str, Any] = {"source": name}
     if target.is_valve:
-        level = ranges.valve_level(values)
+        level = matching.valve_level(values)
         return source if level is None else {**source, "threshold": level}
     if unit and unit != target.unit:
         source["unit"] = unit
-    if target.unit == "rad" and wraps(ranges.in_ours(values, unit, "rad")):
+    if target.unit == "rad" and wraps(matching.in_ours(values, unit, "rad")):
         source["unwrap"] = True
-    return source | (ranges.gauge(values, unit) if target.unit == "Pa" else {})
+    return source | (matching.gauge(values, unit) if target.unit == "Pa" else {})
 
 
 def _by_number(source: dict[str, Any], number: Mapping[str, int]) -> dict[str, Any]:

@@ -2,17 +2,197 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from kemba.logs.draft.ranges import two_levels
-from kemba.logs.draft.targets import Target
 from kemba.logs.draft.words import Meaning, Names, named_unit, unknown
 from kemba.quantity import convert
 from kemba.trajectory import Array
+
+Meant = dict[str, str]
+
+
+@dataclass(frozen=True)
+class Target:
+    """One of our columns.
+
+    `means`: what a foreign name must say, group by group; only that a position is one may go
+    unsaid. `may`: what it may say as well; anything else in the same group speaks against it.
+    """
+
+    header: str
+    means: Meant
+    may: Meant = field(default_factory=dict)
+    needed: bool = False
+
+    @property
+    def unit(self) -> str:
+        """Our unit."""
+        return self.header[self.header.index("[") + 1 : -1]
+
+    @property
+    def is_valve(self) -> bool:
+        """Whether it is a command of 0 and 1."""
+        return "valve/" in self.header
+
+    @property
+    def is_command(self) -> bool:
+        """Whether what was asked for is what it holds."""
+        return self.is_valve or self.header.endswith("hip/tau [N.m]")
+
+
+def robot_targets(legs: Sequence[str]) -> list[Target]:
+    """The columns of a robot's log."""
+    body = {"part": "body"}
+    place = {**body, "kind": "position"}
+    found = [
+        Target("body/x [m]", {"direction": "x"}, place, needed=True),
+        Target("body/z [m]", {"direction": "z"}, place, needed=True),
+        Target("body/pitch [rad]", {"direction": "pitch"}, place, needed=True),
+        Target("body/vx [m.s-1]", {"direction": "x", "kind": "speed"}, body),
+        Target("body/vz [m.s-1]", {"direction": "z", "kind": "speed"}, body),
+        Target("body/ax [m.s-2]", {"direction": "x", "kind": "acceleration"}, body),
+        Target("body/az [m.s-2]", {"direction": "z", "kind": "acceleration"}, body),
+    ]
+    for leg in legs:
+        own, force = {"leg": leg} if len(legs) > 1 else {}, {"kind": "force"}
+        found += [
+            Target(f"{leg}/hip/q [rad]", {**own, "part": "hip", "kind": "position"}, needed=True),
+            Target(f"{leg}/hip/tau [N.m]", {**own, "kind": "torque"}, {"part": "hip"}, needed=True),
+            *_piston(f"{leg}/", own, {"part": "piston"}),
+            Target(f"{leg}/foot/Fx [N]", {**own, "part": "foot", "direction": "x"}, force),
+            Target(f"{leg}/foot/Fz [N]", {**own, "part": "foot", "direction": "z"}, force),
+        ]
+    return [*found, _supply()]
+
+
+def bench_targets() -> list[Target]:
+    """The columns of one piston on a rig."""
+    speed = Target("piston/v [m.s-1]", {"kind": "speed"}, {"part": "piston", "direction": "x"})
+    return [*_piston("", {}, {}, bench=True), speed, _supply()]
+
+
+def rig_targets(logged: Mapping[str, str]) -> list[Target]:
+    """The columns of a rig of the user's own: those that its model's logs must have, by unit."""
+    if "axis/q" in logged:
+        return drive_targets(logged["axis/q"] == "rad")
+    if "piston/x" in logged:
+        return [
+            Target(t.header, t.means, t.may, True)
+            for t in bench_targets()
+            if t.header.split(" [")[0] in logged
+        ]
+    means = {"vessel/P": "pressure", "vessel/T": "temperature"}
+    return [Target(f"{n} [{u}]", {"kind": means[n]}, needed=True) for n, u in logged.items()]
+
+
+def drive_targets(rotary: bool) -> list[Target]:
+    """The columns of a drive: one axis, a force or a torque."""
+    may = {"part": "axis"}
+    if rotary:
+        turning = {**may, "direction": "pitch"}
+        return [
+            Target("axis/q [rad]", {"kind": "position"}, turning, needed=True),
+            Target("axis/tau [N.m]", {"kind": "torque"}, may, needed=True),
+        ]
+    return [
+        Target("axis/q [m]", {"kind": "position"}, {**may, "direction": "x"}, needed=True),
+        Target("axis/tau [N]", {"kind": "force"}, may, needed=True),
+    ]
+
+
+def _piston(path: str, own: Meant, part: Meant, bench: bool = False) -> list[Target]:
+    may = {"part": "piston", "direction": "x"}
+    found = [
+        Target(f"{path}piston/x [m]", {**own, **part, "kind": "position"}, may, needed=True),
+        Target(f"{path}piston/F [N]", {**own, **part, "kind": "force"}, {"part": "piston"}, bench),
+    ]
+    for side in ("extend", "retract"):
+        valve = {**own, "part": "valve", "side": side}
+        pressure = {**own, "kind": "pressure", "side": side}
+        chamber = {"part": "piston"}
+        found.append(Target(f"{path}valve/{side} [1]", valve, needed=True))
+        found.append(Target(f"{path}chamber/{side}/P [Pa]", pressure, chamber))
+    return found
+
+
+def _supply() -> Target:
+    return Target("supply/P [Pa]", {"part": "supply", "kind": "pressure"})
+
+
+# Per SI unit: (unit, largest magnitude of a typical value in it). The first that fits is taken.
+# Robots of 0.1 to 2 m, strokes below 0.3 m, pressures of 0.5 to 12 bar, 50 Hz to 10 kHz.
+LENGTH = (("m", 3.0), ("cm", 60.0), ("mm", 3e3), ("um", 3e6))
+EXTENSION = (("m", 0.5), ("mm", 500.0), ("um", 5e5))
+LENGTHS = ("m", "cm", "mm", "um")
+ANGLE = (("rad", 6.6), ("deg", 400.0), ("mrad", 7e3))
+PRESSURE = (("MPa", 0.05), ("bar", 20.0), ("kPa", 2e3), ("mbar", 2e4), ("Pa", 2e6))
+STEP = (("s", 0.05), ("ms", 50.0), ("us", 5e4), ("ns", 5e7))
+ABSOLUTE = 0.8e5  # Pa; a pressure that falls below it is counted from the atmosphere
+ATMOSPHERE = "1.01325 bar"
+
+
+def guessed_unit(header: str, values: Array, stroke: float | None = None) -> str | None:
+    """The unit of a column by its values, or those of all that are `alike`; None where it is ours
+    or cannot be told. That of a piston makes most of them the `stroke` [m]."""
+    unit = header[header.index("[") + 1 : -1]
+    table = {"m": EXTENSION if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
+    size = float(np.nanmax(np.abs(values), initial=0.0))
+    if "piston/x" in header and stroke and size:
+        far = {name: abs(math.log10(convert(size, name, "m") / stroke)) for name in LENGTHS}
+        best = min(far, key=far.__getitem__)
+        return None if best == "m" else best
+    for name, largest in table.get(unit, ()):
+        if size <= largest:
+            return None if name == unit else name
+    return None
+
+
+def alike(header: str) -> str:
+    """What columns have in common that one log gives in one unit: all angles, all pistons. Force
+    sensors are told apart: each has its own amplifier."""
+    unit = header[header.index("[") + 1 : -1]
+    return header if unit == "N" else f"piston {unit}" if "piston/" in header else unit
+
+
+def time_unit(values: Array) -> str:
+    """The unit of a time column (n,) by the step between its rows."""
+    steps = np.diff(values)
+    step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    return next((unit for unit, largest in STEP if step <= largest), "ns")
+
+
+def in_ours(values: Array, unit: str | None, ours: str) -> Array:
+    """Values (n,) in our unit."""
+    return convert(values, unit or ours, ours)
+
+
+def gauge(values: Array, unit: str | None) -> dict[str, Any]:
+    """The offset of a pressure (n,) that is zero at the atmosphere."""
+    low = float(np.nanmin(in_ours(values, unit, "Pa"), initial=np.inf))
+    return {"offset": ATMOSPHERE} if low < ABSOLUTE else {}
+
+
+def valve_level(values: Array) -> float | None:
+    """Half way between the two levels of a valve (n,); None where they are 0 and 1."""
+    finite = values[np.isfinite(values)]
+    if not len(finite) or set(np.unique(finite)) <= {0.0, 1.0}:
+        return None
+    return float(f"{(finite.min() + finite.max()) / 2:.3g}")
+
+
+def two_levels(values: Array) -> bool:
+    """Whether nearly all values (n,) lie at the ends of their range, as those of a valve do."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 2 or np.ptp(finite) == 0:
+        return len(finite) > 0
+    share = (finite - finite.min()) / np.ptp(finite)
+    return bool(np.mean((share < 0.1) | (share > 0.9)) > 0.98)
+
 
 # Scores of a name are shares of what it must say; the rest only breaks ties between columns.
 NOTHING = -1.0  # of a name that says something else

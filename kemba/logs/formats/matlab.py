@@ -7,6 +7,10 @@ import re
 import subprocess
 import sys
 import tempfile
+import zipfile
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +18,162 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
-from kemba.logs.formats import missing
-from kemba.logs.formats.arrays import metadata, vectors
-from kemba.logs.recording import Column, Group, Raw, Recording, recording
+from kemba.files import write_json as write_json_file
+from kemba.logs.formats import check_size, missing
+from kemba.logs.recording import Column, Group, Raw, Recording, by_length, recording
+from kemba.logs.times import seconds
 from kemba.trajectory import TIME, Trajectory
+
+SPACE = re.compile(r"[ \t\n\r]*")
+BROKEN = (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfile.BadZipFile)
+
+
+def write_npz(trajectory: Trajectory, path: Path) -> None:
+    """One array per column by name, and `units` and `meta` (JSON)."""
+    values = {name: trajectory[name] for name in trajectory.names}
+    units = np.array([trajectory.unit(name) for name in trajectory.names])
+    meta = np.array(json.dumps(plain(trajectory.meta)))
+    content: dict[str, Any] = {"time": trajectory.time, "units": units, "meta": meta, **values}
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **content)
+
+
+def read_npz(path: Path) -> Recording:
+    """Our own .npz by its units; else every vector of numbers. Raises KembaError if damaged."""
+    try:
+        with zipfile.ZipFile(path) as packed:
+            check_size(path, sum(member.file_size for member in packed.infolist()))
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            content = {name: file[name] for name in file.files}
+    except (*BROKEN, OSError) as error:
+        raise KembaError(str(path), f"is no .npz file of numbers: {error}") from None
+    if "units" not in content or "time" not in content:
+        return vectors(content, path)
+    names = [name for name in content if name not in ("time", "units", "meta")]
+    units = np.atleast_1d(content["units"]).tolist()
+    if len(units) != len(names):
+        raise KembaError(str(path), f"has {len(units)} units for {len(names)} columns")
+    pairs = zip(names, units, strict=True)
+    columns = {f"{name} [{unit}]": content[name] for name, unit in pairs}
+    return Recording({TIME: content["time"], **columns}, metadata(content.get("meta")))
+
+
+def write_json(trajectory: Trajectory, path: Path) -> None:
+    """Columns by header, and the metadata."""
+    pairs = zip(trajectory.headers, trajectory.names, strict=True)
+    columns = {TIME: trajectory.time, **{header: trajectory[name] for header, name in pairs}}
+    write_json_file(path, {"columns": columns, "meta": trajectory.meta})
+
+
+def read_json(path: Path) -> Recording:
+    """Columns by name, under `columns` or at the top; null is a missing reading. Raises KembaError
+    where the file is no such object."""
+    try:
+        content = _content(path.read_text(encoding="utf-8"))
+        columns = content.get("columns", content)
+        found = {k: _array(v) for k, v in columns.items() if isinstance(v, list | np.ndarray)}
+    except OSError as error:
+        raise KembaError(str(path), error.strerror or str(error)) from None
+    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        raise KembaError(str(path), f"is no JSON object of columns: {error}") from None
+    meta = content.get("meta", {})
+    return replace(vectors(found, path), meta=meta if isinstance(meta, dict) else {})
+
+
+def vectors(content: Mapping[str, Any], path: Path) -> Recording:
+    """Vectors of numbers, and the columns of matrices: under the names in a list of texts as long,
+    else by number. Raises KembaError where there are none, with what the file holds."""
+    arrays = {name: np.squeeze(np.asarray(value)) for name, value in content.items()}
+    found: Raw = {}
+    for name, array in arrays.items():
+        if array.dtype.names:
+            arrays_of = {f"{name}/{key}": array[key] for key in array.dtype.names}
+            found |= {
+                key: a for key, a in arrays_of.items() if a.ndim == 1 and a.dtype.kind in "fiub"
+            }
+        elif array.dtype.kind not in "fiub":
+            if array.ndim == 1 and len(array) > 2 and seconds(array) is not None:
+                found[name] = array.astype(object)
+        elif array.ndim == 1:
+            found[name] = array
+        elif array.ndim == 2 and min(array.shape) > 1:
+            found |= _matrix(name, array, arrays)
+    if not found:
+        held = ", ".join(f"'{n}' of shape {a.shape}" for n, a in list(arrays.items())[:6])
+        what = f"holds no vector of numbers: {held or 'nothing at all'}"
+        raise KembaError(str(path), what, "one for each column was expected")
+    return by_length(found)
+
+
+def _matrix(name: str, array: Column, arrays: Mapping[str, Column]) -> Raw:
+    """The columns of a matrix (n, k) or (k, n)."""
+    tall = array if array.shape[0] >= array.shape[1] else array.T
+    texts = [a for a in arrays.values() if a.dtype.kind == "U" and a.shape == (tall.shape[1],)]
+    names = [str(n).strip() for n in texts[0]] if texts else []
+    if len(set(names)) != tall.shape[1]:
+        names = [f"{name}/{i}" for i in range(1, tall.shape[1] + 1)]
+    return {label: tall[:, i] for i, label in enumerate(names)}
+
+
+def _content(text: str) -> dict[str, Any]:
+    """The object of a JSON text, lists of columns as arrays: a list takes four times as much memory
+    as its array, and so only one is there at a time. Raises ValueError."""
+    found, end = _members(text, 0)
+    if text[end:].strip():
+        raise ValueError(f"more behind its end, at {end}")
+    return found
+
+
+def _members(text: str, at: int) -> tuple[dict[str, Any], int]:
+    """The members of the object that begins at `at`, of its `columns` alike, and where it ends."""
+    decode, found = json.JSONDecoder().raw_decode, dict[str, Any]()
+
+    def after(mark: str, at: int) -> int:
+        begin = _begin(text, at)
+        if text[begin : begin + 1] != mark:
+            raise ValueError(f"'{mark}' was expected at {begin}")
+        return _begin(text, begin + 1)
+
+    at = after("{", at)
+    while text[at : at + 1] != "}":
+        at = after(",", at) if found else at
+        key, at = decode(text, at)
+        at = after(":", at)
+        inner = key == "columns" and text[at : at + 1] == "{"
+        value, at = _members(text, at) if inner else decode(text, at)
+        with suppress(ValueError, TypeError):
+            value = _array(value) if isinstance(value, list) else value
+        if not isinstance(key, str):
+            raise ValueError(f"the name of a column was expected before {at}")
+        found[key], at = value, _begin(text, at)
+    return found, at + 1
+
+
+def _begin(text: str, at: int) -> int:
+    """Where the next thing begins that is no space."""
+    match = SPACE.match(text, at)
+    return match.end() if match else at
+
+
+def _array(values: list[Any] | Column) -> Column:
+    """A list of JSON as an array: of texts, of numbers that no float holds, else of floats."""
+    if isinstance(values, np.ndarray):
+        return values
+    if values and all(isinstance(value, str) for value in values):
+        return np.array(values)
+    if values and all(type(value) is int for value in values):
+        return np.array(values)
+    return np.array(values, dtype=float)
+
+
+def metadata(text: Any) -> dict[str, Any]:
+    """The metadata in a text of JSON; none where it is no such text."""
+    try:
+        found = json.loads(str(text))
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
 
 LONGEST = 120.0  # s that reading one file may take
 EXPECTED = "a MATLAB file was expected: save(..., '-v7')"
@@ -45,7 +201,7 @@ def write_mat(trajectory: Trajectory, path: Path) -> None:
 def read_mat(path: Path) -> Recording:
     """Our own .mat by its headers; else every series that has its times, wherever in structs,
     cells and objects it stands, and every loose vector. Raises KembaError where there is none."""
-    index, arrays = _content(path)
+    index, arrays = _sorted_out(path)
     loose = {name: arrays[f"a{at}"] for name, at in index["loose"]}
     if "headers" in loose:
         headers = [str(header) for header in np.atleast_1d(loose["headers"])]
@@ -77,7 +233,7 @@ def _parts(name: str, values: Column, rows: int) -> Raw:
     return {f"{name}/{i}": column for i, column in enumerate(flat.T, start=1)}
 
 
-def _content(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
+def _sorted_out(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
     """What each array is, and the arrays, read by another process: damaged files may kill it."""
     try:
         with path.open("rb"):

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+from array import array
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,207 @@ from mcap.writer import Writer
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.logs.formats import check_size, missing
-from kemba.logs.formats.decoding import Topic, decoder
-from kemba.logs.recording import Recording, recording
+from kemba.logs.recording import Group, Raw, Recording, recording
 from kemba.trajectory import TIME, Trajectory
+
+Decode = Callable[[bytes], Any]
+NUMBERS = (bool, int, float, np.number)
+KNOWN: dict[type, tuple[str, ...]] = {}  # fields of the classes of messages that were met
+
+
+class Topic:
+    """Messages of one topic as they come in: stamps [ns], and numbers by path.
+
+    Messages of one shape are kept side by side, so that the paths are put together once a shape.
+    """
+
+    def __init__(self, name: str, decode: Decode = json.loads) -> None:
+        self.name, self.decode = name, decode
+        self.stamps: list[int] = []
+        self._shapes: dict[tuple[Any, ...], _Shape] = {}
+
+    def add(self, stamp: int, message: Any) -> None:
+        """Append a message; fields that come later than others are missing before."""
+        numbers: list[float] = []
+        signs: list[Any] = []
+        _leaves(message, numbers, signs)
+        key = tuple(signs)
+        shape = self._shapes.get(key)
+        if shape is None:
+            shape = self._shapes[key] = _Shape([name for name, _ in flat(message)])
+            shape.texts = {n for n, value in flat(message) if isinstance(value, str)}
+        shape.numbers.extend(numbers)
+        shape.rows.append(len(self.stamps))
+        self.stamps.append(stamp)
+
+    @cached_property
+    def texts(self) -> set[str]:
+        """Paths of texts, once all messages are in."""
+        return {name for shape in self._shapes.values() for name in shape.texts}
+
+    @cached_property
+    def columns(self) -> Raw:
+        """The numbers (n,) by path, NaN where a message has none, once all messages are in."""
+        found: Raw = {}
+        for shape in self._shapes.values():
+            table = np.frombuffer(shape.numbers).reshape(len(shape.rows), len(shape.names))
+            for name, values in zip(shape.names, table.T, strict=True):
+                if name in shape.texts:
+                    continue
+                if name not in found:
+                    found[name] = np.full(len(self.stamps), np.nan)
+                found[name][shape.rows] = values
+        self._shapes = {key: replace(s, numbers=array("d")) for key, s in self._shapes.items()}
+        return found
+
+    def group(self) -> Group:
+        """The topic in the order of its stamps, equal ones once."""
+        stamps = np.array(self.stamps, dtype=np.int64)
+        order = np.argsort(stamps, kind="stable")
+        order = order[np.concatenate([[True], np.diff(stamps[order]) > 0])]
+        if len(order) == len(stamps) and np.all(np.diff(order) > 0):
+            return Group(self.name, stamps, "ns", self.columns)
+        columns = {name: values[order] for name, values in self.columns.items()}
+        return Group(self.name, stamps[order], "ns", columns)
+
+
+@dataclass
+class _Shape:
+    """Messages whose numbers and texts have the same paths `names` (k,): their `rows` (m,), and
+    their `numbers` (m k,), NaN for a text."""
+
+    names: list[str]
+    texts: set[str] = field(default_factory=set)
+    rows: list[int] = field(default_factory=list)
+    numbers: array[float] = field(default_factory=lambda: array("d"))
+
+
+def decoder(encoding: str, schema: Any) -> Decode | None:
+    """What turns the bytes of a message into an object; None where nothing here reads them."""
+    if encoding == "json":
+        return json.loads
+    if encoding == "cdr" and schema is not None:
+        return _cdr(schema.name, schema.encoding, schema.data.decode(errors="replace"))
+    if encoding == "protobuf" and schema is not None:
+        return _protobuf(schema.name, schema.data)
+    return None
+
+
+def _cdr(name: str, encoding: str, text: str) -> Decode | None:
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    store = get_typestore(Stores.EMPTY)
+    if encoding == "ros2msg":
+        store.register(get_types_from_msg(text, name))
+    elif encoding == "ros2idl":
+        store.register(get_types_from_idl(text))
+    else:
+        return None
+    return lambda data: store.deserialize_cdr(data, name)
+
+
+def cdr_of_store(name: str) -> Decode | None:
+    """The same for a type that ROS 2 itself brings; None of the user's own."""
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.LATEST)
+    if name not in store.types:
+        return None
+    return lambda data: store.deserialize_cdr(data, name)
+
+
+def _protobuf(name: str, data: bytes) -> Decode:
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+
+    pool = descriptor_pool.DescriptorPool()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(data).file:
+        pool.Add(file)
+    kind = message_factory.GetMessageClass(pool.FindMessageTypeByName(name))
+    return lambda data: kind.FromString(data)
+
+
+def flat(value: Any, name: str = "") -> Iterator[tuple[str, float | str]]:
+    """The numbers and texts of a message by their path: `position/0`, or `position/knee` where it
+    names its entries as a JointState does."""
+    if isinstance(value, bool | int | float | np.number):
+        yield name, float(value)
+        return
+    if isinstance(value, str):
+        yield name, value
+        return
+    items = _items(value)
+    names = _entries(items)
+    for key, item in items.items():
+        path = f"{name}/{key}".strip("/")
+        if names and key != "name" and _length(item) == len(names):
+            for entry, part in zip(names, item, strict=True):
+                yield from flat(part, f"{path}/{entry}")
+        else:
+            yield from flat(item, path)
+
+
+def _leaves(value: Any, numbers: list[float], signs: list[Any]) -> None:
+    """Append the numbers of a message in the order of `flat`, NaN for a text, and signs of its
+    shape: keys, lengths, and the names of entries."""
+    kind = type(value)
+    if kind is np.ndarray and value.ndim == 1 and value.dtype.kind in "fiub":
+        numbers.extend(value.tolist())
+        signs.append(len(value))
+    elif kind is list and not value:
+        signs.append(0)
+    elif kind is str:
+        numbers.append(np.nan)
+        signs.append("")
+    elif isinstance(value, NUMBERS):
+        numbers.append(float(value))
+        signs.append("number")
+    else:
+        items = _items(value)
+        signs.append((*items, *_entries(items)) if "name" in items else tuple(items))
+        for item in items.values():
+            if type(item) is float:  # most are, and a call takes longer than all else
+                numbers.append(item)
+                signs.append("number")
+            else:
+                _leaves(item, numbers, signs)
+
+
+def _fields(kind: type) -> tuple[str, ...]:
+    """The fields of a class of messages; none of what is no dataclass."""
+    if kind not in KNOWN:
+        known = getattr(kind, "__dataclass_fields__", ())
+        KNOWN[kind] = tuple(key for key in known if key[0] != "_")
+    return KNOWN[kind]
+
+
+def _items(value: Any) -> Mapping[str, Any]:
+    if fields := _fields(type(value)):
+        return {key: getattr(value, key) for key in fields}
+    if isinstance(value, dict):
+        return value
+    if isinstance(value, list | tuple | np.ndarray):
+        return {str(i): item for i, item in enumerate(value)}
+    if hasattr(value, "DESCRIPTOR"):
+        return {field.name: getattr(value, field.name) for field in value.DESCRIPTOR.fields}
+    if hasattr(value, "__len__") and not isinstance(value, str | bytes):
+        return {str(i): item for i, item in enumerate(value)}  # a repeated field of protobuf
+    return {}
+
+
+def _entries(items: Mapping[str, Any]) -> list[str]:
+    """The texts under `name`, if each other list is as long."""
+    found = items.get("name")
+    if isinstance(found, list | tuple) and found and all(isinstance(n, str) and n for n in found):
+        return list(found)
+    return []
+
+
+def _length(value: Any) -> int:
+    listed = isinstance(value, list | tuple | np.ndarray) or (
+        hasattr(value, "__len__") and not isinstance(value, str | bytes | dict)
+    )
+    return len(value) if listed else -1
+
 
 META = "kemba"
 NS = 1_000_000_000

@@ -11,8 +11,7 @@ from typing import Any
 
 from kemba.errors import KembaError
 from kemba.logs.formats import check_size, missing
-from kemba.logs.formats.decoding import Decode, Topic, cdr_of_store, decoder
-from kemba.logs.formats.mcap import read_mcap
+from kemba.logs.formats.mcap import Decode, Topic, cdr_of_store, decoder, read_mcap
 from kemba.logs.recording import Recording, recording
 
 WAY_OUT = "ros2 bag convert writes it without, or as MCAP"

@@ -1,4 +1,4 @@
-"""Which pairs take part, the forces that hold them, and what holds at one instant: impacts, accelerations, forces."""
+"""Which pairs take part, the forces that hold them, impacts and accelerations at one instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Linear systems of a dozen unknowns, and small linear complementarity problems: 0 <= z _|_ w = A z + b >= 0.
+"""Small linear systems and complementarity problems: 0 <= z _|_ w = A z + b >= 0.
 
 Contact modes rarely change from one step to the next, so the last one is tried first; Lemke's
 method (lexicographic, hence finite for contact with friction: Stewart and Trinkle, 1996) answers

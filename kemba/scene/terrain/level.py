@@ -1,4 +1,4 @@
-"""Level ground at a height: a step, whose edge is a wall, where it differs from what ends."""
+"""Level ground."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.compare.force_profiles import ForceProfile
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.spec import load_model
-from kemba.plotting.study.comparison import plot_comparison
+from kemba.plotting.comparison import plot_comparison
 
 
 def compared(*effects: dict) -> Comparison:

@@ -1,0 +1,100 @@
+"""`kemba-opt compare`: where a model fails on logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, results, say
+
+if TYPE_CHECKING:
+    from kemba.identify.compare.compare import Comparison
+
+
+SHOWN = 5
+
+
+def compare(
+    logs: Annotated[
+        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
+    ],
+    model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
+    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    figure: Annotated[
+        bool | None,
+        typer.Option(
+            "--figure/--no-figure", help="Draw where the model fails.", show_default="no-figure"
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Figure to write: PNG, PDF or SVG (a new compare.png here).")
+    ] = None,
+    column_map: Foreign = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Say whether a model explains logs to within their noise and, if not, where it fails.
+
+    Example: kemba-opt compare jump_1.csv jump_2.csv --out heat_map.png
+    """
+    from kemba.folders import place_for
+    from kemba.identify.compare_logs import compare_logs
+    from kemba.logs import log_files
+    from kemba.model.spec import evidence_faults
+    from kemba_cli.next_steps import after_compare, say_next
+    from kemba_cli.progress import COMPARE, Progress
+
+    if out is not None and figure is False:
+        raise typer.BadParameter("--out names the figure", param_hint="--no-figure")
+    path = None
+    if figure or out is not None:
+        from kemba.plotting.style import figure_name
+
+        path = figure_name(place_for(out, Path("compare.png"), force))
+    logs = log_files(logs)
+    with Progress(quiet or json, COMPARE) as progress:
+        found, _ = compare_logs(logs, model, column_map, run, progress.tell)
+    if path is not None:
+        from kemba.plotting.comparison import plot_comparison
+        from kemba.plotting.style import save_figure
+
+        save_figure(plot_comparison(found), path)
+        say(f"wrote {path}", quiet)
+    if json:
+        print_json({**found.json(), **({"figure": str(path)} if path else {})})
+        return
+    typer.echo(found.sentence)
+    for text in evidence_faults(model):
+        say(text, quiet)
+    if not quiet:
+        _print(found)
+    say_next(after_compare(logs, column_map, model, run, found.good or found.tolerable), quiet)
+
+
+def _print(found: Comparison) -> None:
+    from rich.table import Table
+
+    from kemba.identify.compare.words import effort, off_by, place_of
+    from kemba.units import short
+
+    table = Table("channel", "RMS", "largest", "noise", "error / noise")
+    for c in found.channels:
+        numbers = (f"{x:.3g}" for x in (c.rmse, c.max, c.noise_sigma, c.ratio))
+        table.add_row(c.name.replace("[", r"\["), *numbers)
+    results().print(table)
+    for at in sorted((c for c in found.bins if c.significant), key=lambda c: c.q_value)[:SHOWN]:
+        typer.echo(f"  {place_of(at)}: {short(at.ratio)} times the noise")
+    for hint in found.hints[:SHOWN]:
+        typer.echo(f"  {hint.text}")
+    for peak in found.peaks:
+        if peak.low * peak.high > 0 and not found.good:
+            size = f"{peak.value:+.3g} {peak.unit} ({peak.low:.3g} to {peak.high:.3g})"
+            when = f"at {peak.time_s:.3f} s of {peak.run}"
+            typer.echo(f"  missing {effort(peak.channel, peak.unit)}: {size} {when}")
+    if found.plan:
+        parts = (off_by(header, error) for header, error in found.plan.items())
+        typer.echo(f"  farthest from the plan: {', '.join(parts)}")

@@ -1,1 +1,0 @@
-"""Verbs about files and the catalogue."""

@@ -1,0 +1,123 @@
+"""`kemba-opt learn`: one round from executed runs to the next run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json, say
+
+
+def learn(
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Runs that were executed; their logs may follow (the newest run)."),
+    ] = None,
+    logs: Annotated[
+        list[Path] | None,
+        typer.Option(help="A log, or a folder of logs; may be repeated (the run's newest)."),
+    ] = None,
+    target: Annotated[
+        str | None, typer.Option(help="Task YAML to plan next; else that of the last run.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
+    ] = None,
+    holdout: Annotated[
+        list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
+    ] = None,
+    column_map: Foreign = None,
+    time_limit: Annotated[
+        float, typer.Option(min=5.0, help="Seconds of discovery at most.")
+    ] = 300.0,
+    correct: Annotated[
+        bool,
+        typer.Option(
+            help="Correct what the model does not explain by shifting when valves switch."
+        ),
+    ] = True,
+    force: Force = False,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Learn from executed runs and plan the next one: compare, discover, adopt, plan, correct.
+
+    The new run folder holds the model (answer/), the plan, a controller table with the correction
+    (correction.yaml), and the page learn.html. Exit code 1 when the new plan is not confirmed.
+
+    With nothing given it takes the newest run and its newest logs.
+
+    Example: kemba-opt learn runs/jump-1 --logs runs/jump-1/logs --target jump.yaml
+    """
+    from kemba.config import find_config
+    from kemba.learn.page import write_learning
+    from kemba.learn.round import Asked
+    from kemba.learn.round import learn as learn_once
+    from kemba.ocp import load_task
+    from kemba.runs import RunFolder, load_run
+    from kemba.solve import Listener
+    from kemba_cli.next_steps import after_solve, say_next
+    from kemba_cli.progress import LEARN, Progress
+
+    folders, listed = _told_apart(runs or [], logs or [])
+    folders = folders or [newest(quiet or json, "controller.csv")]
+    listed = listed or _logs_of(folders[-1], quiet or json)
+    task = target or str(load_run(folders[-1]).task)
+    asked = Asked(
+        folders, listed, task, overrides or [], holdout or [], column_map, time_limit, correct
+    )
+    name = load_task(task, list(overrides or []))[0].name  # mistakes first, before minutes of work
+    folder = RunFolder.create(out, name, [find_config(task, "tasks"), *listed], force=force)
+    try:
+        with Progress(quiet or json, LEARN) as progress:
+            found = learn_once(asked, folder, Listener(progress.tell, progress.watch))
+    except BaseException:
+        if folder.lock is not None:
+            folder.finish("failed")
+        raise
+    page = write_learning(found, folder.path)
+    if json:
+        print_json(found.json())
+    else:
+        typer.echo(str(folder.path))
+        say(found.sentence, quiet and found.good)
+        say(f"{page}", quiet)
+        say_next(after_solve(str(folder.path), found.good), quiet)
+    if not found.good:
+        raise typer.Exit(1)
+
+
+def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Path]]:
+    """The runs and the logs among the arguments; a folder of logs stands for what it holds.
+
+    Raises KembaError where a log does not exist.
+    """
+    from kemba.errors import KembaError
+    from kemba.logs import log_files
+
+    folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
+    listed: list[Path] = []
+    for path in [*logs, *(path for path in runs if path not in folders)]:
+        if not path.exists():
+            raise KembaError(str(path), "no such file or folder", "logs of the run were expected")
+        listed += log_files([path])
+    return folders, listed
+
+
+def _logs_of(run: Path, quiet: bool) -> list[Path]:
+    """The newest logs of a run; says which. Raises KembaError where it has none."""
+    from kemba.errors import KembaError
+    from kemba.runs import newest_logs
+
+    found = newest_logs(run)
+    if not found:
+        hint = f"execute it: kemba-opt simulate {run} --repeat 3 --noise"
+        raise KembaError(str(run), "has no logs", "its logs, or --logs, were expected", hint)
+    say(f"with its newest logs: {len(found)} in {found[0].parent}", quiet)
+    return found

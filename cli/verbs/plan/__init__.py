@@ -1,1 +1,0 @@
-"""Verbs that plan and execute."""

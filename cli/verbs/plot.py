@@ -1,0 +1,80 @@
+"""`kemba-opt plot`: figures and animations of plans, simulations and logs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
+
+
+def plot(
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Run folders and CSVs, several over each other; one folder of bench logs "
+            "(the newest run)."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "--save", help="PNG, PDF or SVG to write (a new one beside the first run)."
+        ),
+    ] = None,
+    animate: Annotated[
+        Path | None, typer.Option(help="Also write a GIF, or an MP4, of the first run.")
+    ] = None,
+    show: Annotated[bool, typer.Option("--show", help="Open a window.")] = False,
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML with the robot and limits, not the run's own.")
+    ] = None,
+    column_map: Foreign = None,
+    force: Force = False,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw body, joints, efforts, valves and contact, and a strip of stick figures.
+
+    A folder of bench logs is drawn as the paper draws its rig (Fig. 3, 4, 6 and 7).
+
+    Example: kemba-opt plot runs/jump-1
+    """
+    from kemba import plotting
+    from kemba.folders import fresh, next_free
+    from kemba.logs import load_map
+    from kemba.plotting.style import open_window, show_windows
+    from kemba_cli.next_steps import after_plot, say_next
+
+    for path, option in ((out, "--out"), (animate, "--animate")):
+        if path is not None:
+            fresh(path, force, option)
+    runs = runs or [newest(quiet)]
+    window = open_window() if show else None
+    logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
+    if logs and animate:
+        raise typer.BadParameter("bench logs have no motion to animate", param_hint="--animate")
+    if logs:
+        figure = plotting.plot_rig(logs, model or "planning", figure=window)
+        names, beside = list(logs), runs[0] / "figure.png"
+    else:
+        sources = plotting.load_sources(runs, load_map(column_map) if column_map else None)
+        figure = plotting.draw(sources, model, window)
+        names, beside = [source.name for source in sources], plotting.default_path(sources)
+    path = out or (beside if force else next_free(beside))
+    written = {"figure": plotting.save_figure(figure, path)}
+    if animate:
+        machine = plotting.machine_of(sources[0], model)
+        written["animation"] = plotting.save_animation(sources[0], machine, animate)
+    paths = {kind: str(path) for kind, path in written.items()}
+    if json:
+        print_json({**paths, "runs": names})
+    else:
+        for path in paths.values():
+            typer.echo(path)
+        say_next(after_plot(runs), quiet)
+    if show:
+        show_windows()

@@ -1,0 +1,160 @@
+"""`kemba-opt sweep`: many tasks or executions on Dask, resumable."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say, talk
+
+EVERY = 10.0  # s between lines where no one watches
+
+
+def sweep(
+    file: Annotated[str, typer.Argument(metavar="sweep", help="Sweep YAML, here or shipped.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder to write or to continue (sweeps/NAME).")
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="Override a key: --set seed=2.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="<address>", help="A Dask scheduler instead of our own.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes of our own (as many as cores).")
+    ] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
+    ] = None,
+    figure: Annotated[bool, typer.Option(help="Draw the executions of every block.")] = True,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run many cases and show how many succeeded; the same command continues what was stopped.
+
+    Exit code 1 when a block succeeded less often than it `expect`s, or cases have no answer.
+
+    Example: kemba-opt sweep reliability.yaml --jobs 2
+    """
+    from kemba import sweep as room
+    from kemba.folders import held
+    from kemba_cli.next_steps import after_sweep, say_next
+
+    if scheduler is not None:
+        room.check_scheduler(scheduler)
+    asked, document = room.load_sweep(file, list(overrides or []))
+    with held(out or Path("sweeps") / asked.name) as folder:
+        room.open_folder(folder, asked, document)
+        status, good = _run(
+            folder, asked, document, scheduler, jobs, time_limit, figure, json, quiet
+        )
+    say_next(after_sweep(file, folder, status == "finished"), quiet or json)
+    if not good:
+        raise typer.Exit(1)
+
+
+def _run(
+    folder: Path,
+    asked: Any,
+    document: Any,
+    scheduler: str | None,
+    jobs: int | None,
+    time_limit: float | None,
+    figure: bool,
+    json: bool,
+    quiet: bool,
+) -> tuple[str, bool]:
+    """Do what is missing, write and print the results; the status, and whether all is well."""
+    from kemba import sweep as room
+
+    say(f"results in {folder}", quiet or json)
+    cases = room.expand(asked, document, folder)
+    missing = {case.key for case in cases if case.record(folder) is None}
+    status, records = "interrupted", {}
+    try:
+        with Bar(len(missing), len({case.key for case in cases}), quiet or json) as bar:
+            records = room.run_cases(cases, folder, scheduler, jobs, time_limit, bar.tell)
+        done = all(case.key in records for case in cases)
+        status = "finished" if done else "limit"
+    finally:
+        known = records or {c.key: r for c in cases if (r := c.record(folder)) is not None}
+        summary = room.write_results(folder, asked, cases, known, status)
+    if figure:
+        _figures(folder, cases, known, summary)
+    _answer(folder, status, summary, json)
+    return status, status == "finished" and bool(summary["good"])
+
+
+def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:
+    from kemba.sweep.results import sentence
+
+    if json:
+        print_json({"folder": folder, "status": status, **summary})
+        return
+    typer.echo(str(folder))
+    for name, block in summary["blocks"].items():
+        typer.echo(f"{name}: {sentence(block)}")
+
+
+def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) -> None:
+    """A picture of every block of executions."""
+    for name, block in summary["blocks"].items():
+        found = [records.get(case.key) or {} for case in cases if case.block == name]
+        flown = [record for record in found if "apex_m" in record]
+        if block["kind"] != "execute" or not flown:
+            continue
+        import numpy as np
+
+        from kemba.plotting import plot_robustness, save_figure
+
+        ranks = {
+            key: {answer: told and told["correlation"] for answer, told in pair.items()}
+            for key, pair in block["ranks"].items()
+        }
+        apex, landed = (np.array([r[key] for r in flown]) for key in ("apex_m", "good"))
+        planned = flown[0]["apex_m"] - flown[0]["apex_error_m"]
+        save_figure(plot_robustness(apex, landed, ranks, planned), folder / f"{name}.png")
+
+
+class Bar:
+    """Progress over cases: a bar where someone watches, a line now and then elsewhere."""
+
+    def __init__(self, missing: int, total: int, quiet: bool) -> None:
+        self.done, self.total, self.quiet = total - missing, total, quiet
+        self.began = self.told = time.monotonic()
+        self.bar: Any = None
+
+    def __enter__(self) -> Bar:
+        if self.done:
+            say(f"{self.done} of {self.total} cases are done already", self.quiet)
+        if not self.quiet and talk().is_terminal:
+            from rich.progress import Progress, TimeRemainingColumn
+
+            columns = [*Progress.get_default_columns()[:-1], TimeRemainingColumn()]
+            self.bar = Progress(*columns, console=talk())
+            self.bar.start()
+            self.task = self.bar.add_task("cases", total=self.total, completed=self.done)
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self.bar is not None:
+            with suppress(KeyboardInterrupt):
+                self.bar.stop()
+
+    def tell(self, case: Any, record: dict[str, Any]) -> None:
+        """A case has ended."""
+        self.done += 1
+        last = f"{case.block} {case.index}: {record['sentence']}"
+        if self.bar is not None:
+            self.bar.update(self.task, completed=self.done)
+            if not record["good"]:
+                self.bar.console.print(last, markup=False)
+        elif not record["good"] or time.monotonic() > self.told + EVERY or self.done == self.total:
+            self.told = time.monotonic()
+            say(f"{self.told - self.began:6.1f} s  {self.done}/{self.total}  {last}", self.quiet)

@@ -1,0 +1,53 @@
+"""`kemba-opt view`: a motion in 3-D."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
+
+
+def view(
+    motion: Annotated[
+        Path | None, typer.Argument(help="Run folder, or the log of a motion (the newest run).")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="HTML to write (a new view.html beside it).")
+    ] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model YAML with the robot, not the run's own.")
+    ] = None,
+    run: Annotated[
+        Path | None, typer.Option(help="Run folder whose plan is drawn as a ghost.")
+    ] = None,
+    rerun: Annotated[
+        Path | None, typer.Option(help="Recording (.rrd) for the Rerun viewer to write instead.")
+    ] = None,
+    column_map: Foreign = None,
+    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    force: Force = False,
+    own_effects: OwnEffects = None,
+    json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play, or for Rerun.
+
+    Example: kemba-opt view runs/jump-1 --show
+    """
+    shown = motion or newest(quiet)
+    if rerun is None:
+        from kemba.report.view import view_run
+
+        path = view_run(shown, out, model, force, column_map, run)
+    else:
+        from kemba.report.view import record_run
+
+        path = record_run(shown, rerun, model, force, column_map, run)
+    print_json({"view": str(path)}) if json else typer.echo(path)
+    if show and rerun is None:
+        import webbrowser
+
+        webbrowser.open(path.resolve().as_uri())

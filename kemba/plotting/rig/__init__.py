@@ -1,1 +1,0 @@
-"""Figures of bench logs and rigs."""

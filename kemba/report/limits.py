@@ -1,0 +1,336 @@
+"""How close a motion comes to the limits of the robot: use, torque and speed, energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from kemba.effects.mechanics.motor import Motor
+from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.mechanism import Cylinder
+from kemba.model import Model
+from kemba.plotting import Machine
+from kemba.report.charts import Book, Chart, Curve, Track, colour, table
+from kemba.report.motion import Events
+from kemba.report.use import (
+    NORMAL,
+    Use,
+    air_drawn,
+    envelope,
+    full_for,
+    motor_of,
+    pressure,
+    rate,
+    slides,
+    supply_share,
+    use_of,
+)
+from kemba.trajectory import Array
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Work (rows,) [J] since the start of the pistons and of the hips; energy that impacts take
+    [J], air drawn from the supply [kg]. None where it is not known."""
+
+    pistons: Array | None
+    hips: Array | None
+    impacts: float | None
+    drawn: float | None
+
+
+def energy_of(
+    track: Track, legs: Sequence[str], cylinder: Cylinder, certificate: Mapping[str, Any]
+) -> Energy:
+    """The energy of one motion."""
+    listed = track.t.meta.get("impacts")
+    if track.role == "plan":
+        listed = certificate.get("impacts")
+    drawn = [air_drawn(track, leg, cylinder) for leg in legs]
+    return Energy(
+        _summed([_piston_power(track, leg, cylinder) for leg in legs], track),
+        _summed([_hip_power(track, leg) for leg in legs], track),
+        sum(float(i["energy_J"]) for i in listed) if listed is not None else None,
+        sum(one or 0.0 for one in drawn) if any(one is not None for one in drawn) else None,
+    )
+
+
+def _piston_power(track: Track, leg: str, cylinder: Cylinder) -> Array | None:
+    """Of the force on the rod where it is known, else of the air alone."""
+    t = track.t
+    push, pull = (pressure(t, leg, side, cylinder) for side in ("extend", "retract"))
+    speed = rate(track, f"{leg}/piston/v", f"{leg}/piston/x")
+    if f"{leg}/piston/F" in t:
+        return np.asarray(t[f"{leg}/piston/F"] * speed)
+    if push is None or pull is None or not np.isfinite(speed).any():
+        return None
+    force = cylinder.area_extend * (push - ATMOSPHERE)
+    return np.asarray((force - cylinder.area_retract * (pull - ATMOSPHERE)) * speed)
+
+
+def _hip_power(track: Track, leg: str) -> Array | None:
+    if f"{leg}/hip/tau" not in track.t:
+        return None
+    return np.asarray(track.t[f"{leg}/hip/tau"] * rate(track, f"{leg}/hip/w", f"{leg}/hip/q"))
+
+
+def _summed(powers: Sequence[Array | None], track: Track) -> Array | None:
+    """Work (rows,) of all legs since the start."""
+    if any(power is None for power in powers):
+        return None
+    total = np.nan_to_num(np.sum([power for power in powers if power is not None], axis=0))
+    steps = np.diff(track.t.time) * 0.5 * (total[1:] + total[:-1])
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def put_in(work: Array | None) -> tuple[float, float] | None:
+    """Energy [J] put in, and taken out again."""
+    if work is None:
+        return None
+    steps = np.diff(work)
+    return float(steps[steps > 0].sum()), float(-steps[steps < 0].sum())
+
+
+WIDE, HIGH, LEFT, BOTTOM = 420.0, 200.0, 34.0, 26.0
+POINTS = 300  # of each curve
+DASHED = ' stroke-dasharray="5 3"'
+
+
+def torque_speed(leg: str, tracks: Sequence[Track], uses: Sequence[Use], motor: Motor) -> str:
+    """Torque against driving speed as SVG; empty where no motion has both."""
+    curves = [(i, *_driving(use)) for i, use in enumerate(uses)]
+    curves = [(i, speed, torque) for i, speed, torque in curves if len(speed)]
+    if not curves:
+        return ""
+    low = min(-1.0, *(float(speed.min()) for _, speed, _ in curves))
+
+    def at(speed: float, torque: float) -> str:
+        x = LEFT + (speed - low) / (motor.w_noload - low) * (WIDE - LEFT - 4)
+        y = HIGH - BOTTOM - torque / (1.08 * motor.tau_peak) * (HIGH - BOTTOM - 4)
+        return f"{x:.1f},{y:.1f}"
+
+    border = " ".join(at(max(speed, low), torque) for speed, torque in envelope(motor))
+    lines = "".join(
+        f'<polyline points="{" ".join(at(*pair) for pair in zip(speed, torque, strict=True))}" '
+        f'fill="none" stroke="{colour(tracks, i)}" stroke-width="1.2"'
+        f"{DASHED if tracks[i].role == 'plant' else ''}/>"
+        for i, speed, torque in curves
+    )
+    ticks = "".join(
+        _tick(at(speed, 0.0), f"{speed + 0.0:g}", 12.0, "middle")
+        for speed in np.arange(np.ceil(low / 10) * 10, motor.w_noload, 10)
+    )
+    ticks += "".join(
+        _tick(at(low, torque), f"{torque:g}", 4.0, "end")
+        for torque in np.arange(0, motor.tau_peak, 8)
+    )
+    used = max(float(np.nanmax(use.motor)) for use in uses if np.isfinite(use.motor).any())
+    title = f"{leg.title()} hip: torque against speed"
+    alt = f"{title}; at most {100 * used:.0f} % of what the motor gives is used"
+    return (
+        f"<figure><figcaption><b>{escape(title)}</b> [N.m against rad/s]</figcaption>"
+        f'<svg viewBox="0 0 {WIDE:g} {HIGH:g}" role="img" aria-label="{escape(alt)}">'
+        f'<polyline points="{border}" fill="none" stroke="#8c8c8c" stroke-dasharray="4 3"/>'
+        f'<polyline points="{at(low, 1.08 * motor.tau_peak)} {at(low, 0.0)} '
+        f'{at(motor.w_noload, 0.0)}" fill="none" stroke="#8c8c8c"/>{lines}{ticks}</svg></figure>'
+    )
+
+
+def _driving(use: Use) -> tuple[Array, Array]:
+    """Speed in the direction of the torque, and the torque's size, thinned out."""
+    known = np.flatnonzero(np.isfinite(use.torque) & np.isfinite(use.speed))
+    chosen = known[:: max(1, len(known) // POINTS)]
+    torque = use.torque[chosen]
+    return use.speed[chosen] * np.sign(torque), np.abs(torque)
+
+
+def _tick(place: str, text: str, down: float, anchor: str) -> str:
+    x, y = (float(part) for part in place.split(","))
+    x -= 4.0 if anchor == "end" else 0.0
+    return (
+        f'<text x="{x:.1f}" y="{y + down:.1f}" font-size="10" fill="#595959" '
+        f'text-anchor="{anchor}">{text}</text>'
+    )
+
+
+MOST = 6  # times in a cell of a table
+
+
+def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str:
+    """Apex, lift-off and touchdown of every motion."""
+    legs = list(dict.fromkeys(leg for e in events if e for leg in e.touchdowns))
+    heads = ["motion", "apex of the body's centre", "feet rise", "lift-off"]
+    heads += [f"touchdown {leg}" for leg in legs] + ["end"]
+    rows = []
+    for track, e in zip(tracks, events, strict=True):
+        if e is None:
+            continue
+        rows.append(
+            [
+                escape(track.name),
+                _tops(e),
+                _or_dash(e.feet, 100, "cm", 1),
+                _times(e.lift_offs),
+                *(_touchdown(e, leg) for leg in legs),
+                f"<b>{escape(e.fault)}</b>" if e.fault else "upright",
+            ]
+        )
+    clock = "Times of the plan's clock. " if any(track.role == "plan" for track in tracks) else ""
+    title = f"{clock}The apex is that of the body's centre, which is above the feet."
+    return table(title, heads, rows)
+
+
+def _tops(e: Events) -> str:
+    """The apexes of several flights, else the highest point."""
+    tops = e.apexes if len(e.apexes) > 1 else [(e.apex_time, e.apex)]
+    return ", ".join(f"{z:.3f} m at {time:.3f} s" for time, z in tops)
+
+
+def _touchdown(e: Events, leg: str) -> str:
+    text, grazes = _times(e.touchdowns.get(leg, ())), e.grazes.get(leg, ())
+    return text + (f'<span class="aside">grazes at {_times(grazes)}</span>' if grazes else "")
+
+
+def _times(listed: Sequence[float]) -> str:
+    """The first few times [s]."""
+    if not listed:
+        return "-"
+    more = f" and {len(listed) - MOST} more" if len(listed) > MOST else ""
+    return ", ".join(f"{time:.3f}" for time in listed[:MOST]) + " s" + more
+
+
+def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
+    """Torque-speed planes, use of motor and friction cone in time, and a table of it all."""
+    legs = machine.mechanism.legs
+    used = {leg: [use_of(track, model, machine, leg) for track in book.tracks] for leg in legs}
+    planes, charts = [], []
+    for leg, uses in used.items():
+        motor = motor_of(model, leg)
+        if motor:
+            planes.append(torque_speed(leg, book.tracks, uses, motor))
+    for title, name in (
+        ("hip: share of motor limit", "motor"),
+        ("foot: share of friction cone", "cone"),
+    ):
+        for leg, uses in used.items():
+            lines = [
+                Curve(track.name, 100.0 * _onto(book.grid, track, getattr(use, name)), i)
+                for i, (track, use) in enumerate(zip(book.tracks, uses, strict=True))
+            ]
+            charts.append(book.add(Chart(f"{leg.title()} {title}", "%", lines, levels=(100.0,))))
+    charts.append(book.add(_supply_chart(book)))
+    grid = f'<div class="grid legs">{"".join(planes)}{"".join(charts)}</div>'
+    return [_limit_table(book.tracks, used, machine), grid]
+
+
+def _supply_chart(book: Book) -> Chart:
+    """How far the supply falls while the chambers draw on it."""
+    levels = [(i, track, supply_share(track.t)) for i, track in enumerate(book.tracks)]
+    lines = [
+        Curve(track.name, 100.0 * _onto(book.grid, track, level), i)
+        for i, track, level in levels
+        if level is not None
+    ]
+    return Chart("Supply pressure, of that at the start", "%", lines, least=10.0)
+
+
+def _limit_table(
+    tracks: Sequence[Track], used: Mapping[str, Sequence[Use]], machine: Machine
+) -> str:
+    rows = []
+    for i, track in enumerate(tracks):
+        coordinates = machine.coordinates(track.t)
+        points = machine.points(coordinates) if coordinates is not None else {}
+        supply = supply_share(track.t)
+        lowest = "-" if supply is None else f"{100 * float(np.nanmin(supply)):.0f} %"
+        for leg, uses in used.items():
+            foot = points[f"{leg}/foot"][:, 0] if points else None
+            slid = slides(track, leg, machine.stance(track.t, leg), foot)
+            rows.append(
+                [
+                    escape(track.name),
+                    escape(leg),
+                    _largest(np.abs(uses[i].torque), "N.m", 1),
+                    _largest(100 * uses[i].motor, "%", 0),
+                    f"{1e3 * full_for(track, uses[i].motor):.0f} ms",
+                    _largest(100 * uses[i].cone, "%", 0),
+                    _or_dash(slid, 1e3, "mm", 1),
+                    lowest,
+                ]
+            )
+    heads = ["motion", "leg", "largest torque", "largest share of the limit", "time at the limit"]
+    heads += ["largest share of the friction cone", "foot slides", "lowest supply pressure"]
+    note = (
+        '<p class="soft">The limit is the torque that the motor gives at that speed. At 100 % of '
+        "the friction cone a foot begins to slide; a measured foot may show more: its forces are "
+        "noisy, or the ground grips better than in the model. The supply is what reaches the "
+        "valves: its pressure above the atmosphere as a share of that at the start.</p>"
+    )
+    return table("Largest use of motors and ground", heads, rows) + note
+
+
+def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -> list[str]:
+    """Work in time, and a table of work, impacts and air drawn."""
+    cylinder = machine.mechanism.need_cylinder()
+    found = [energy_of(t, machine.mechanism.legs, cylinder, certificate) for t in book.tracks]
+    rows = [
+        [escape(track.name), *_both(one.pistons), *_both(one.hips), _impacts(one), _air(one)]
+        for track, one in zip(book.tracks, found, strict=True)
+    ]
+    heads = ["motion", "pistons put in", "pistons take out", "hips put in", "hips take out"]
+    text = table("Energy", [*heads, "impacts take", "air drawn"], rows)
+    charts = []
+    for title, name in (("Work of the pistons", "pistons"), ("Work of the hips", "hips")):
+        lines = [
+            Curve(track.name, _onto(book.grid, track, work), i)
+            for i, (track, one) in enumerate(zip(book.tracks, found, strict=True))
+            if (work := getattr(one, name)) is not None
+        ]
+        charts.append(book.add(Chart(title, "J", lines, least=1.0)))
+    note = (
+        '<p class="soft">Work of the pistons: of the force on the rod, after friction and damping. '
+        "Air drawn: what the "
+        "chambers hold more after each time a valve was on, at 20 deg C; 1 l at atmospheric "
+        "pressure.</p>"
+    )
+    return [text, f'<div class="grid">{"".join(charts)}</div>', note]
+
+
+def _onto(grid: Array, track: Track, values: Array) -> Array:
+    """Values by row of a motion at the times of the page."""
+    time, known = track.t.time, np.isfinite(values)
+    if not known.any():
+        return np.full(len(grid), np.nan)
+    at = np.clip(np.searchsorted(time, grid), 0, len(time) - 1)
+    found = np.interp(grid, time[known], values[known])
+    outside = (grid < time[0] - 1e-9) | (grid > time[-1] + 1e-9) | ~known[at]
+    return np.where(outside, np.nan, found)
+
+
+def _largest(values: Array, unit: str, digits: int) -> str:
+    known = values[np.isfinite(values)]
+    return f"{known.max():.{digits}f} {unit}" if len(known) else "-"
+
+
+def _or_dash(value: float | None, factor: float, unit: str, digits: int) -> str:
+    known = value is not None and np.isfinite(value)
+    return f"{factor * value:.{digits}f} {unit}" if known and value is not None else "-"
+
+
+def _both(work: Array | None) -> tuple[str, str]:
+    pair = put_in(work)
+    return (f"{pair[0]:.1f} J", f"{pair[1]:.1f} J") if pair else ("-", "-")
+
+
+def _impacts(one: Energy) -> str:
+    return "-" if one.impacts is None else f"{one.impacts:.1f} J"
+
+
+def _air(one: Energy) -> str:
+    if one.drawn is None:
+        return "-"
+    return f"{1e3 * one.drawn:.2f} g ({one.drawn / NORMAL:.1f} l)"

@@ -1,1 +1,0 @@
-"""Where the model fails on the logs, and what it lacks."""

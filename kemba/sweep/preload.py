@@ -1,0 +1,11 @@
+"""Loaded by our own workers: Ctrl-C reaches the whole terminal, but only the client answers it."""
+
+from __future__ import annotations
+
+import signal
+from typing import Any
+
+
+def dask_setup(_: Any) -> None:
+    """Called by dask when a worker starts."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,1 +1,0 @@
-"""Results of all cases as tables and sentences."""
