@@ -18,8 +18,7 @@ from kemba.settings import ORIGINS, Settings
 ROOT = Path(kemba.__file__).parent
 DRAWN = (
     "plotting/",
-    "report/review/",
-    "report/stage.py",
+    "report/",
 )  # lengths, colours and speeds of pictures
 
 # Numbers at a module's top level that are explained here and not by a comment beside them.
@@ -75,11 +74,13 @@ CONSTANTS = {  # file -> names, why
     "logs/formats/mat_child.py": ("MEMORY DEEPEST", "the same limit, with room to read; depth"),
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/matching.py": (
-        "LENGTH EXTENSION ANGLE PRESSURE STEP ABSOLUTE NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
+        "LENGTH EXTENSION ANGLE PRESSURE STEP ABSOLUTE "
+        "NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
         "readings by which units are guessed; how the words of a name are weighed",
     ),
     "logs/draft/clock.py": (
-        "RISING REPEATED STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER LARGEST",
+        "RISING REPEATED STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER "
+        "LARGEST",
         "how clocks are ranked by their names; units",
     ),
     "logs/draft/words.py": ("UNIT_NORM", "rounding of a quaternion's norm"),
