@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from kemba.scenarios.share import wilson
-from kemba.sweep.results import InfluenceSettings, rank, with_sizes
+from kemba.sweep.results import CHANCE, rank, with_sizes
 from kemba.units import read_si
 
 Row = dict[str, Any]
@@ -148,9 +148,8 @@ def _apexes(rows: Sequence[Row]) -> Iterator[str]:
 def _influences(rows: Sequence[Row]) -> Iterator[str]:
     yield "## What costs most"
     yield ""
-    chance = InfluenceSettings.current().chance
     yield "Rank correlations (Spearman) of the conditions with success, the strongest three that"
-    yield f"are hardly chance (p < {chance:g}). What varies about zero may cost on either side, so"
+    yield f"are hardly chance (p < {CHANCE:g}). What varies about zero may cost on either side, so"
     yield "its size, `|...|`, is looked at as well."
     yield ""
     for task in _tasks(rows):
@@ -166,7 +165,6 @@ def _strongest(rows: Sequence[Row], most: int = 3) -> str:
     columns = {key: np.array([read_si(r["values"][key])[0] for r in rows])
                for key in rows[0]["values"]}  # fmt: skip
     ranks = {key: rank(values, landed) for key, values in with_sizes(columns).items()}
-    chance = InfluenceSettings.current().chance
-    told = {k: r["correlation"] for k, r in ranks.items() if r and r["p_value"] < chance}
+    told = {k: r["correlation"] for k, r in ranks.items() if r and r["p_value"] < CHANCE}
     order = sorted(told, key=lambda key: -abs(told[key]))[:most]
     return ", ".join(f"`{key}` {told[key]:+.2f}" for key in order)

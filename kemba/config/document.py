@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, WithJsonSchema
 
-from kemba.config.reader import PATTERNS, Location, Mark, YamlError, YamlLimits, read
+from kemba.config.reader import LARGEST, PATTERNS, Location, Mark, YamlError, read
 from kemba.errors import ConfigErrors, KembaError
 from kemba.files import atomic_text
 
@@ -134,10 +134,10 @@ class Document:
 def load_yaml(path: str | Path) -> Document:
     """The document in a YAML 1.2 file.
 
-    Raises KembaError when the file cannot be read, is not YAML or is larger than `YamlLimits`, and
+    Raises KembaError when the file cannot be read, is not YAML or is larger than 2 MB, and
     ConfigErrors listing all keys that occur twice.
     """
-    largest = YamlLimits.current().size
+    largest = LARGEST
     try:
         with Path(path).open("rb") as stream:
             content = stream.read(largest + 1)

@@ -13,8 +13,6 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from kemba.settings import Settings, setting
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -72,18 +70,14 @@ Mark = tuple[int, int]
 CORE = "tag:yaml.org,2002:"
 
 
-class YamlLimits(Settings):
-    """How large a YAML file may be. Real files are far smaller; a "YAML bomb" is refused."""
-
-    size: int = setting(2_000_000, "B", "of a file", "convention: a second of reading")
-    nodes: int = setting(
-        20_000, "1", "keys, items and values, those behind aliases included",
-        "convention: ten times the largest shipped file, read within a second",
-    )  # fmt: skip
-    depth: int = setting(30, "1", "nested groups", "convention: no schema is deeper than 8")
-    aliases: int = setting(200, "1", "uses of `*name`", "convention: far above any use")
-    key: int = setting(200, "1", "characters of a key", "convention: no column name is longer")
-    text: int = setting(20_000, "1", "characters of a value", "convention: five pages of notes")
+LARGEST = 2_000_000  # B; of a file (a second of reading)
+# keys, items and values, those behind aliases included (ten times the largest shipped file,
+# read within a second)
+MOST_NODES = 20_000
+DEEPEST = 30  # nested groups (no schema is deeper than 8)
+MOST_ALIASES = 200  # uses of `*name` (far above any use)
+LONGEST_KEY = 200  # characters of a key (no column name is longer)
+LONGEST_TEXT = 20_000  # characters of a value (five pages of notes)
 
 
 class YamlError(Exception):
@@ -115,13 +109,12 @@ class Read:
 
 def read(text: str) -> Read:
     """The data of a YAML text with one document. Raises YamlError."""
-    limits = YamlLimits.current()
-    if len(text) > limits.size:
-        raise YamlError(f"is longer than {limits.size} characters")
+    if len(text) > LARGEST:
+        raise YamlError(f"is longer than {LARGEST} characters")
     found = Read()
-    tree = _Builder(limits).tree(text)
+    tree = _Builder().tree(text)
     if tree is not None:
-        _Walk(found, limits).into(tree, ())
+        _Walk(found).into(tree, ())
         found.data = _data(tree)
     return found
 
@@ -129,8 +122,7 @@ def read(text: str) -> Read:
 class _Builder:
     """From events to a tree. Aliases share their tree, so they take no memory here."""
 
-    def __init__(self, limits: YamlLimits) -> None:
-        self.limits = limits
+    def __init__(self) -> None:
         self.anchors: dict[str, Tree] = {}
         self.open: list[tuple[Tree, list[tuple[str, Mark] | None]]] = []
         self.root: Tree | None = None
@@ -161,16 +153,16 @@ class _Builder:
     def _begin(self, tree: Tree, event: Any, kind: str) -> None:
         if event.tag not in (None, "!", CORE + kind):
             raise YamlError(_tag(event.tag), tree.mark, "leave the tag out")
-        if len(self.open) >= self.limits.depth:
-            raise YamlError(f"is nested deeper than {self.limits.depth} levels", tree.mark)
+        if len(self.open) >= DEEPEST:
+            raise YamlError(f"is nested deeper than {DEEPEST} levels", tree.mark)
         self._add(tree, event.anchor)
         self.open.append((tree, [None]))
 
     def _add(self, tree: Tree, anchor: str | None) -> None:
         """Add a node at its place: as a key, a value, an item, or the whole document."""
         self.count += 1
-        if self.count > self.limits.nodes:
-            raise YamlError(f"has more than {self.limits.nodes} keys and values", tree.mark)
+        if self.count > MOST_NODES:
+            raise YamlError(f"has more than {MOST_NODES} keys and values", tree.mark)
         if anchor is not None:
             self.anchors[anchor] = tree
         if not self.open:
@@ -192,15 +184,15 @@ class _Builder:
         if text == "<<" and not tree.value[0]:
             what = "'<<' (merging of groups) is not part of YAML 1.2"
             raise YamlError(what, tree.mark, "write the keys out, or use 'base' in a model")
-        if len(text) > self.limits.key:
-            what = f"this key has {len(text)} characters; {self.limits.key} are allowed"
+        if len(text) > LONGEST_KEY:
+            what = f"this key has {len(text)} characters; {LONGEST_KEY} are allowed"
             raise YamlError(what, tree.mark)
         return text
 
     def _alias(self, name: str, mark: Mark) -> Tree:
         self.aliases += 1
-        if self.aliases > self.limits.aliases:
-            raise YamlError(f"has more than {self.limits.aliases} aliases", mark)
+        if self.aliases > MOST_ALIASES:
+            raise YamlError(f"has more than {MOST_ALIASES} aliases", mark)
         if name not in self.anchors:
             raise YamlError(f"the alias '*{name}' has no anchor '&{name}' before it", mark)
         if not self.anchors[name].closed:
@@ -210,8 +202,8 @@ class _Builder:
     def _scalar(self, event: Any, mark: Mark) -> Tree:
         """`value`: whether it is quoted, its text, and its value."""
         text: str = event.value
-        if len(text) > self.limits.text:
-            what = f"this text has {len(text)} characters; {self.limits.text} are allowed"
+        if len(text) > LONGEST_TEXT:
+            what = f"this text has {len(text)} characters; {LONGEST_TEXT} are allowed"
             raise YamlError(what, mark)
         plain, tag = event.implicit[0], event.tag
         try:
@@ -235,8 +227,8 @@ class _Builder:
 class _Walk:
     """Places of all parts of a tree; an aliased tree counts at every alias."""
 
-    def __init__(self, found: Read, limits: YamlLimits) -> None:
-        self.found, self.limits, self.count = found, limits, 0
+    def __init__(self, found: Read) -> None:
+        self.found, self.count = found, 0
 
     def into(self, tree: Tree, location: Location) -> None:
         """Write down the line of every key of a tree at `location`, and which keys are given twice.
@@ -244,10 +236,10 @@ class _Walk:
         Raises YamlError where aliases make the tree too large or too deep.
         """
         self.count += 1
-        if self.count > self.limits.nodes or len(location) > self.limits.depth:
-            what = f"its aliases stand for more than {self.limits.nodes} keys and values"
-            if len(location) > self.limits.depth:
-                what = f"its aliases are nested deeper than {self.limits.depth} levels"
+        if self.count > MOST_NODES or len(location) > DEEPEST:
+            what = f"its aliases stand for more than {MOST_NODES} keys and values"
+            if len(location) > DEEPEST:
+                what = f"its aliases are nested deeper than {DEEPEST} levels"
             raise YamlError(what, tree.mark)
         for part, mark, inner in _parts(tree):
             place = (*location, part)
@@ -285,7 +277,7 @@ def _events(text: str) -> Iterator[Any]:
         mark = error.problem_mark or error.context_mark
         what = f"is not valid YAML: {error.problem or error.context}"
         if "nesting depth" in str(error.problem):  # libyaml reads ahead, to a limit of its own
-            what = f"is nested deeper than {YamlLimits.current().depth} levels"
+            what = f"is nested deeper than {DEEPEST} levels"
         raise YamlError(what, (mark.line, mark.column) if mark else None) from None
     except (yaml.YAMLError, ValueError) as error:
         raise YamlError(f"is not valid YAML: {str(error).splitlines()[0]}") from None

@@ -19,31 +19,16 @@ from kemba.effects.base import Effect
 from kemba.effects.sensors import SensorEffect
 from kemba.effects.series import Series
 from kemba.model import SUPPLY, Model
-from kemba.settings import CHOSEN, Settings, setting
 
-
-class ContractSettings(Settings):
-    """What an effect must change at least to count, and what is rounding."""
-
-    seen: float = setting(
-        1e-3, "1", "of a channel of size 1: a sensor fault that changes less is none", CHOSEN
-    )
-    undone: float = setting(
-        1e-3,
-        "1",
-        "of a channel of size 1: error that undoing a fault may leave",
-        "derived: a shift in time reads between rows 0.5 ms apart",
-    )
-    widest: float = setting(
-        0.1, "1", "a figure less certain than this is a parameter to fit, no tolerance", CHOSEN
-    )
-    nothing: float = setting(
-        1e-9,
-        "1",
-        "slope of the residual below which a figure has no influence",
-        "derived: far above rounding errors, far below what matters",
-    )
-    power: float = setting(1e-6, "W", "rounding of a dissipated power", CHOSEN)
+SEEN = 1e-3  # of a channel of size 1: a sensor fault that changes less is none
+# of a channel of size 1: error that undoing a fault may leave (a shift in time reads between
+# rows 0.5 ms apart)
+UNDONE = 1e-3
+WIDEST = 0.1  # a figure less certain than this is a parameter to fit, no tolerance
+# slope of the residual below which a figure has no influence (far above rounding errors, far
+# below what matters)
+NOTHING = 1e-9
+POWER = 1e-6  # W; rounding of a dissipated power
 
 
 def finite(placed: Placed) -> None:
@@ -80,7 +65,7 @@ def every_parameter_matters(placed: Placed) -> None:
     )
     for i, name in enumerate(effect.parameters()):
         moves_bounds = effect.bind({name: 1.1 * effect.value(name)}).inputs() != effect.inputs()
-        if not moves_bounds and slope[:, i].max() <= ContractSettings.current().nothing:
+        if not moves_bounds and slope[:, i].max() <= NOTHING:
             raise Broken(f"{name} changes nothing")
 
 
@@ -140,9 +125,9 @@ def dissipates(placed: Placed) -> None:
     for point in points(placed.model, 12):
         change = values_of(placed.model, point)["dynamics"] - values_of(base, point)["dynamics"]
         lost.append(float(point["v"] @ change))
-    if min(lost) < -ContractSettings.current().nothing:
+    if min(lost) < -NOTHING:
         raise Broken(f"it gives {-min(lost):.3g} W; `dissipative` says that it only takes")
-    if max(lost) <= ContractSettings.current().power:
+    if max(lost) <= POWER:
         raise Broken("it takes no energy at all")
 
 
@@ -231,9 +216,9 @@ def sensor_fault_can_be_undone(placed: Placed) -> None:
     time = np.linspace(0.0, 1.0, 2001)
     true = Series(time, np.sin(9 * time), (9 * np.cos(9 * time),))
     shown = fault.measured(true)
-    if np.abs(shown.value - true.value).max() <= ContractSettings.current().seen:
+    if np.abs(shown.value - true.value).max() <= SEEN:
         raise Broken("it changes nothing that is measured")
-    if np.abs(fault.undone(shown).value - true.value).max() > ContractSettings.current().undone:
+    if np.abs(fault.undone(shown).value - true.value).max() > UNDONE:
         raise Broken("`undone` does not give back the input of `measured`")
 
 
@@ -242,7 +227,7 @@ def nominal_figures_matter(placed: Placed) -> None:
 
     Raises Broken where it is not so.
     """
-    effect, settings = placed.resolved, ContractSettings.current()
+    effect = placed.resolved
     for name, tolerance in effect.nominal.items():
         if name not in type(effect).model_fields:
             raise Broken(f"`nominal` names '{name}', which is no field")
@@ -252,8 +237,8 @@ def nominal_figures_matter(placed: Placed) -> None:
             raise Broken(f"{name}: its tolerance has no source")
     tolerances = effect.tolerances()
     for figure, share in tolerances.items():
-        if not 0.0 < share <= settings.widest:
-            expected = f"0 to {settings.widest:g} expected"
+        if not 0.0 < share <= WIDEST:
+            expected = f"0 to {WIDEST:g} expected"
             raise Broken(f"{figure}: its tolerance is {share:g} of it; {expected}")
     missing = set(effect.nominal) - {name.partition("[")[0] for name in tolerances}
     if missing:
@@ -265,5 +250,5 @@ def nominal_figures_matter(placed: Placed) -> None:
     found = [np.abs(scaled(**x, p=ones)["dp"].full()) for x in points(placed.model, 12)]
     largest = np.max(found, axis=(0, 1))
     for figure, slope in zip(tolerances, largest, strict=True):
-        if slope <= settings.nothing:
+        if slope <= NOTHING:
             raise Broken(f"{figure} has a tolerance, but it changes nothing")

@@ -13,39 +13,19 @@ from kemba.errors import KembaError
 from kemba.model.model import Model
 from kemba.model.node import Node
 from kemba.quantity import Quantity
-from kemba.settings import CHOSEN, Settings, setting
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class RestSettings(Settings):
-    """How long states are given to come to rest, and how exactly that is computed."""
-
-    wait: float = setting(
-        3.0,
-        "s",
-        "time after which states count as at rest; a leak would empty any tank in the end",
-        "derived: ten times the recovery of a usual supply, 0.3 s",
-    )
-    still: float = setting(
-        1e-6,
-        "s-1",
-        "rate, in scales of a state, below which it rests",
-        CHOSEN,
-    )
-    steps: int = setting(8, "1", "steps of Newton's method, before the wait is simulated", CHOSEN)
-    left: float = setting(
-        1e-4,
-        "1",
-        "share of a change that is left after the wait, below which a state has settled",
-        "derived: a supply that recovers within 0.3 s has 5e-5 left",
-    )
-    tolerance: float = setting(
-        1e-9,
-        "1",
-        "of the integration, in scales of the states",
-        CHOSEN,
-    )
+# s; time after which states count as at rest; a leak would empty any tank in the end (ten times
+# the recovery of a usual supply, 0.3 s)
+WAIT = 3.0
+STILL = 1e-6  # s-1; rate, in scales of a state, below which it rests
+STEPS = 8  # steps of Newton's method, before the wait is simulated
+# share of a change that is left after the wait, below which a state has settled (a supply that
+# recovers within 0.3 s has 5e-5 left)
+LEFT = 1e-4
+TOLERANCE = 1e-9  # of the integration, in scales of the states
 
 
 class Rest:
@@ -62,11 +42,10 @@ class Rest:
         scaled = ca.substitute(rate, s, x * self._scale) / self._scale
         slope = ca.densify(ca.jacobian(scaled, x))
         self._changes = ca.Function("changes", [x, p], [ca.densify(scaled), slope])
-        settings = RestSettings.current()
-        options = {"abstol": settings.tolerance, "reltol": settings.tolerance}
+        options = {"abstol": TOLERANCE, "reltol": TOLERANCE}
         options["disable_internal_warnings"] = True  # what did not settle is told by KembaError
         equation = {"x": x, "p": p, "ode": scaled}
-        self._wait = ca.integrator("wait", "cvodes", equation, 0.0, settings.wait, options)
+        self._wait = ca.integrator("wait", "cvodes", equation, 0.0, WAIT, options)
 
     def __call__(self, *held: Any) -> Array:
         """The states (ns,) with `held` in the order of the symbols; they begin at their nominal
@@ -87,17 +66,16 @@ class Rest:
     def _settled(self, x: Array, p: Array) -> Array | None:
         """Where scaled states (ns,) do not change any more, by Newton's method from x; None where
         it finds no such place, or a state would get there after the wait only."""
-        settings = RestSettings.current()
-        for step in range(settings.steps):
+        for step in range(STEPS):
             moving, slope = (a.full() for a in self._changes(x, p))
-            still = bool(np.all(np.abs(moving) <= settings.still))
+            still = bool(np.all(np.abs(moving) <= STILL))
             if still and not step:
                 return x  # nothing moves
             if not (np.isfinite(moving).all() and np.isfinite(slope).all()):
                 return None
             if still:
                 slowest = float(np.linalg.eigvals(slope).real.max())
-                return x if slowest * settings.wait < np.log(settings.left) else None
+                return x if slowest * WAIT < np.log(LEFT) else None
             try:
                 x = x - np.linalg.solve(slope, moving).ravel()
             except np.linalg.LinAlgError:

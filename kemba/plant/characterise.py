@@ -21,7 +21,6 @@ from kemba.model import Model, ModelSpec
 from kemba.plant.commands import Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.rigs import drive, followed
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 
@@ -64,34 +63,11 @@ def linear(X: Array, y: Array, read: Array | None = None) -> tuple[list[Estimate
     return [Estimate(float(v), float(a), float(b)) for v, a, b in bounds], r2
 
 
-class RiseSettings(Settings):
-    """Which switchings of a locked rod are read, and where their answer begins."""
-
-    still: float = setting(
-        2e-4,
-        "m",
-        "way below which the rod counts as locked",
-        CHOSEN,
-    )
-    step: float = setting(
-        20.0,
-        "N",
-        "smallest step of the force that is read",
-        CHOSEN,
-    )
-    low: float = setting(
-        0.02,
-        "1",
-        "lower share of the step for the line to its start",
-        CHOSEN,
-    )
-    high: float = setting(
-        0.10,
-        "1",
-        "upper share of the step for the line to its start",
-        CHOSEN,
-    )
-    rows: int = setting(20, "1", "rows that an answer needs", CHOSEN)
+STILL = 2e-4  # m; way below which the rod counts as locked
+STEP = 20.0  # N; smallest step of the force that is read
+LOW = 0.02  # lower share of the step for the line to its start
+HIGH = 0.10  # upper share of the step for the line to its start
+ROWS = 20  # rows that an answer needs
 
 
 @dataclass(frozen=True)
@@ -141,7 +117,7 @@ def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
     """Every switching of a chamber in a bench log of a cylinder of `stroke` [m], while the rod is
     locked."""
     x = log["piston/x"]
-    if np.ptp(x) > RiseSettings.current().still:
+    if np.ptp(x) > STILL:
         return
     valves = {name: log[f"valve/{name}"] > 0.5 for name in ("extend", "retract")}
     edges = {name: np.flatnonzero(np.diff(v.astype(int))) + 1 for name, v in valves.items()}
@@ -161,15 +137,14 @@ def _rise(
     log: Trajectory, edge: int, stop: int, sign: float, chamber: str
 ) -> dict[str, Any] | None:
     """The answer to the switching at row `edge`, until row `stop`; None where it shows nothing."""
-    limits = RiseSettings.current()
     force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
     before = float(force[max(edge - 20, 0) : edge].mean())
     after = float(force[stop - max((stop - edge) // 10, 3) : stop].mean())
-    if abs(after - before) < limits.step or stop - edge < limits.rows:
+    if abs(after - before) < STEP or stop - edge < ROWS:
         return None
     level = (force[edge - 1 : stop] - before) / (after - before)
-    low, high = (_crossing(time, level, share) for share in (limits.low, limits.high))
-    dead = low - (high - low) * limits.low / (limits.high - limits.low)
+    low, high = (_crossing(time, level, share) for share in (LOW, HIGH))
+    dead = low - (high - low) * LOW / (HIGH - LOW)
     supply = float(log.meta.get("supply", 0.7e6))
     return {
         "supply": supply,
@@ -219,40 +194,12 @@ def rise_table(rises: Iterable[Rise]) -> RiseTable:
 MODES = {(1, 0): "extend", (0, 1): "retract", (1, 1): "both", (0, 0): "none"}
 
 
-class StrokeSettings(Settings):
-    """Which samples of a stroke count as steady."""
-
-    travel: float = setting(
-        0.01,
-        "m",
-        "way below which the rod does not move",
-        CHOSEN,
-    )
-    moving: float = setting(
-        0.2,
-        "1",
-        "share of the top speed from which the rod moves",
-        CHOSEN,
-    )
-    begin: float = setting(
-        0.5,
-        "1",
-        "share of the way after which chambers have settled",
-        CHOSEN,
-    )
-    end: float = setting(
-        0.85,
-        "1",
-        "share of the way after which the end is near",
-        CHOSEN,
-    )
-    steady: float = setting(
-        0.03,
-        "1",
-        "deviation from the median speed that counts",
-        CHOSEN,
-    )
-    fewest: int = setting(3, "1", "samples that a steady part needs", CHOSEN)
+TRAVEL = 0.01  # m; way below which the rod does not move
+MOVING = 0.2  # share of the top speed from which the rod moves
+BEGIN = 0.5  # share of the way after which chambers have settled
+END = 0.85  # share of the way after which the end is near
+STEADY = 0.03  # deviation from the median speed that counts
+FEWEST = 3  # samples that a steady part needs
 
 
 @dataclass(frozen=True)
@@ -281,21 +228,20 @@ def find_stroke(log: Trajectory) -> Stroke | None:
 
     None where there is no such part.
     """
-    limits = StrokeSettings.current()
     modes = {
         (int(a > 0.5), int(b > 0.5))
         for a, b in zip(log["valve/extend"], log["valve/retract"], strict=True)
     }
     x = log["piston/x"]
-    if len(modes) > 1 or np.ptp(x) < limits.travel:
+    if len(modes) > 1 or np.ptp(x) < TRAVEL:
         return None
     v = log["piston/v"] if "piston/v" in log else np.gradient(x, log.time)
-    moving = np.abs(v) > limits.moving * np.abs(v).max()
+    moving = np.abs(v) > MOVING * np.abs(v).max()
     usual = float(np.median(v[moving]))
     progress = np.abs(x - x[0]) / float(np.abs(x - x[0]).max())
-    used = moving & (progress > limits.begin) & (progress < limits.end)
-    used &= np.abs(v - usual) < limits.steady * abs(usual)
-    if used.sum() < limits.fewest:
+    used = moving & (progress > BEGIN) & (progress < END)
+    used &= np.abs(v - usual) < STEADY * abs(usual)
+    if used.sum() < FEWEST:
         return None
     mode = MODES[modes.pop()]
     supply = 0.0 if mode == "none" else float(log.meta.get("supply", 0.7e6))

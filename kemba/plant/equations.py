@@ -21,10 +21,8 @@ from kemba.machine_code import Native
 from kemba.mechanism import Mechanism
 from kemba.model import SUPPLY, Model
 from kemba.model.node import Node
-from kemba.plant.kernel.machine import Array, KernelModel
-from kemba.plant.kernel.settings import GAMMA, StepLength
+from kemba.plant.kernel.machine import GAMMA, SPEED, SPIN, Array, KernelModel
 from kemba.plant.pairs import PairTable, read_pairs
-from kemba.settings import Settings, setting
 
 
 class Compiled:
@@ -195,9 +193,8 @@ class Equations:
     def _scale(self) -> Array:
         """Usual sizes of velocities and effect states."""
         states = [row.scale for row in self.node.rate_rows]
-        usual = StepLength.current()
         rows = self.node.dynamics_rows
-        speeds = [usual.speed if row.unit == "N" else usual.spin for row in rows]
+        speeds = [SPEED if row.unit == "N" else SPIN for row in rows]
         return np.array([*speeds, *states])
 
     @cached_property
@@ -242,13 +239,9 @@ class Equations:
         return {name: getattr(self.node, name) for name in names}
 
 
-class Kept(Settings):
-    """What a process keeps for the next plan."""
-
-    models: int = setting(
-        8, "1", "models whose machine code is kept",
-        "convention: twice those of a plan: its model and its plant, each with fitted air",
-    )  # fmt: skip
+# models whose machine code is kept (twice those of a plan: its model and its plant, each with
+# fitted air)
+MODELS = 8
 
 
 @dataclass
@@ -303,8 +296,8 @@ def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) 
         return Equations(model)
     lengths = tuple(sorted(mechanism.offsets.items()))
     robot = mechanism.drawn.model_dump_json(), lengths, repr(mechanism.scene.json())
-    key = (robot, structure, tuple(numbers.items()), StepLength.current())
-    return _PLAIN.get(key, lambda: Equations(model), Kept.current().models)
+    key = (robot, structure, tuple(numbers.items()))
+    return _PLAIN.get(key, lambda: Equations(model), MODELS)
 
 
 def _with_free(model: Model, names: set[str]) -> Equations:

@@ -23,9 +23,16 @@ from kemba.plant.commands import (
 from kemba.plant.equations import Equations
 from kemba.plant.kernel.events import MOST, NOTICED, Impacts
 from kemba.plant.kernel.lcp import NoSolutionError
-from kemba.plant.kernel.machine import Array, memory, state
+from kemba.plant.kernel.machine import (
+    FIRST_STEP,
+    LONGEST_STEP,
+    SHORTEST_STEP,
+    TOLERANCE,
+    Array,
+    memory,
+    state,
+)
 from kemba.plant.kernel.play import ASK, BURIED, DONE, EXPLODED, Law, Marks, NextMark, play
-from kemba.plant.kernel.settings import StepLength
 from kemba.plant.kernel.step import Pace
 from kemba.plant.record import Impact, recorded
 
@@ -80,8 +87,7 @@ class Player:
         Raises KembaError.
         """
         if step is None:
-            s = StepLength.current()
-            pace = Pace(np.array([s.first]), s.shortest, s.longest, s.tolerance)
+            pace = Pace(np.array([FIRST_STEP]), SHORTEST_STEP, LONGEST_STEP, TOLERANCE)
         else:
             pace = Pace(np.array([step]), step, step, np.inf)
         why = -1

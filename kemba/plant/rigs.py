@@ -20,16 +20,12 @@ from kemba.plant.equations import Equations, equations_of
 from kemba.plant.kernel.machine import Array
 from kemba.plant.repeat import Sensors, take_log
 from kemba.quantity import Param
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 ImposedMotion = Callable[[Array], tuple[Array, Array]]  # times (m,) -> x [m], v [m/s]
 
 
-class ImposedSettings(Settings):
-    """The simulation of a piston whose motion is imposed."""
-
-    step: float = setting(2e-4, "s", "longest step of the air", CHOSEN)
+STEP = 2e-4  # s; longest step of the air
 
 
 def drive(
@@ -48,7 +44,7 @@ def drive(
     """
     if not model.mechanism.imposed:
         raise KembaError(model.name, "its motion is free", hint="use kemba.plant.simulate")
-    step = ImposedSettings.current().step if step is None else step
+    step = STEP if step is None else step
     acting = delayed(model, dict(valves)) if dead_time else dict(valves)
     eq, first, last = equations_of(model), float(times[0]), float(times[-1])
     edges = breaks([*acting.values(), *valves.values()], first, last)

@@ -18,24 +18,17 @@ from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.plant.commands import SAME_TIME, Commands, delayed
 from kemba.plant.equations import equations_of, share_equations
-from kemba.plant.kernel.machine import Array
-from kemba.plant.kernel.settings import StepLength
+from kemba.plant.kernel.machine import LONGEST_STEP, Array
 from kemba.plant.record import Impact, trajectory
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from kemba.plant.player import Player
 
 
-class KneeSearch(Settings):
-    """Newton's method for the knee angle that belongs to a piston's place."""
-
-    place: float = setting(
-        1e-12, "m", "error of the piston at which it ends", "derived: far below any sensor"
-    )
-    turn: float = setting(0.3, "rad", "largest change of the angle at once", CHOSEN)
-    rounds: int = setting(50, "1", "changes at most", CHOSEN)
+PLACE = 1e-12  # m; error of the piston at which it ends (far below any sensor)
+TURN = 0.3  # rad; largest change of the angle at once
+ROUNDS = 50  # changes at most
 
 
 def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
@@ -92,11 +85,10 @@ def _knee(model: Model, piston: str, knee: str, x: float) -> float:
     symbol, phi = mechanism.q[index], mechanism.port(piston).phi
     extension = ca.Function("extension", [symbol], [phi, ca.jacobian(phi, symbol)])
     angle = mechanism.standing[knee]
-    settings = KneeSearch.current()
-    for _ in range(settings.rounds):
+    for _ in range(ROUNDS):
         now, slope = (float(value) for value in extension(angle))
-        angle -= float(np.clip((now - x) / slope, -settings.turn, settings.turn))
-        if abs(now - x) < settings.place:
+        angle -= float(np.clip((now - x) / slope, -TURN, TURN))
+        if abs(now - x) < PLACE:
             return angle
     raise KembaError("initial", f"{piston} = {x:g} m cannot be reached")
 
@@ -194,7 +186,7 @@ def _player(condition: Condition) -> Player:
     model, step = condition.model, condition.step
     if model.mechanism.imposed:
         raise KembaError(model.name, "its motion is imposed", hint="use kemba.plant.rigs")
-    longest = StepLength.current().longest  # longer ones of equal length would miss events, too
+    longest = LONGEST_STEP  # longer ones of equal length would miss events, too
     if step is not None and not 0.0 < step <= longest:
         expected = f"up to {longest:g} s was expected"
         raise KembaError("step", f"{step:g} s is out of range", expected)

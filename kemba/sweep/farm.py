@@ -15,7 +15,6 @@ from typing import Any
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.files import write_json
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.sweep.cases import Case, Record, perform
 
 # Instead of Dask's own, with which workers give memory back at once; a solver asks for it again at
@@ -25,13 +24,8 @@ ENVIRONMENT = {"OPENBLAS_NUM_THREADS": 1}
 Tell = Callable[[Case, Record], None]
 
 
-class FarmSettings(Settings):
-    """How long workers and schedulers are waited for."""
-
-    reaching: float = setting(
-        5.0, "s", "for a connection to a scheduler", "convention: slow networks take a second"
-    )
-    result: float = setting(30.0, "s", "for a result that a worker holds", CHOSEN)
+REACHING = 5.0  # s; for a connection to a scheduler (slow networks take a second)
+RESULT = 30.0  # s; for a result that a worker holds
 
 
 def run_cases(
@@ -101,9 +95,9 @@ def _record(task: Any) -> Record | None:
 
     try:
         if task.status == "finished":
-            return dict(task.result(timeout=FarmSettings.current().result))
+            return dict(task.result(timeout=RESULT))
         if task.status == "error":
-            error = task.exception(timeout=FarmSettings.current().result)
+            error = task.exception(timeout=RESULT)
             sentence = f"its worker died, again and again ({type(error).__name__})"
             if isinstance(error, KembaError):  # it could not begin
                 sentence = str(error)
@@ -124,7 +118,7 @@ def check_scheduler(scheduler: str) -> None:
         raise KembaError(f"--scheduler {scheduler}", what, "such as tcp://host:8786")
     try:
         place = (match["host"].strip("[]"), int(match["port"]))
-        socket.create_connection(place, timeout=FarmSettings.current().reaching).close()
+        socket.create_connection(place, timeout=REACHING).close()
     except (OSError, OverflowError, UnicodeError) as error:
         raise _unreachable(scheduler, error) from None
 

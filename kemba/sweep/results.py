@@ -17,24 +17,12 @@ from kemba.files import atomic_text, write_json
 from kemba.folders import LOCK
 from kemba.runs import read_manifest, versions
 from kemba.scenarios.share import wilson
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.sweep.cases import Case, Record, Sweep
 from kemba.sweep.farm import machine
 from kemba.units import read_si
 
-
-class InfluenceSettings(Settings):
-    """Which rank correlations are reported."""
-
-    fewest: int = setting(
-        5,
-        "1",
-        "cases below which a correlation says nothing",
-        CHOSEN,
-    )
-    chance: float = setting(
-        0.05, "1", "p-value above which it may be chance", "convention: the usual 5 %"
-    )
+FEWEST = 5  # cases below which a correlation says nothing
+CHANCE = 0.05  # p-value above which it may be chance (the usual 5 %)
 
 
 def influence(rows: list[tuple[Case, Record | None]]) -> dict[str, Any]:
@@ -60,7 +48,7 @@ def costliest(ranks: dict[str, dict[str, Any]]) -> str | None:
         told = {
             key: abs(found[answer]["correlation"])
             for key, found in ranks.items()
-            if found[answer] and found[answer]["p_value"] < InfluenceSettings.current().chance
+            if found[answer] and found[answer]["p_value"] < CHANCE
         }
         if told:
             return max(told, key=lambda key: told[key])
@@ -72,7 +60,7 @@ def rank(x: np.ndarray, y: np.ndarray) -> dict[str, float] | None:
     constant."""
     from scipy.stats import spearmanr
 
-    if len(x) < InfluenceSettings.current().fewest or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+    if len(x) < FEWEST or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return None
     found = spearmanr(x, y)
     return {"correlation": float(found.statistic), "p_value": float(found.pvalue)}

@@ -8,10 +8,9 @@ from typing import NamedTuple
 from kemba.plant.kernel.contact import impact, touching
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Array, KernelModel, Memory, State
-from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.kernel.step import Pace, keeps_pace, step
 
-BEYOND = ContactEvents.current().beyond
+BEYOND = 1.5  # steps: how far behind the end of a step a touchdown may be looked for
 
 
 @part
@@ -59,10 +58,14 @@ def _between(c0: float, c1: float, c2: float, c3: float, low: float, high: float
     return x
 
 
-_EVENTS = ContactEvents.current()
-CLOSED, MISSED, SEARCHES = _EVENTS.closed, _EVENTS.missed, _EVENTS.searches
-MANY, REACH, MOST = _EVENTS.many, _EVENTS.reach, _EVENTS.most
-NO_TIME, NOTICED = _EVENTS.soonest, _EVENTS.noticed
+CLOSED = 1e-6  # m; a smaller gap touches (far above rounding errors)
+MISSED = 1e-8  # m; a touchdown that is located worse is searched again (far above rounding errors)
+SEARCHES = 4  # searches of one touchdown
+MANY = 12  # events of one step after which gaps close sooner
+REACH = 2e-5  # m; gap that touches from then on
+MOST = 120  # events of one step (ten times `many`)
+NO_TIME = 1e-12  # s; a shorter time is none (far above rounding errors)
+NOTICED = 1e-9  # N.s; a smaller impulse is no impact (far above rounding errors)
 FREE, TOUCHED, TOO_LONG = 0, 1, 2  # how a step ends
 
 

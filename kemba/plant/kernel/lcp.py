@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Array, Lcp
-from kemba.plant.kernel.settings import Complementarity
 
-_NUMBERS = Complementarity.current()
-NEGLIGIBLE, TIE, PIVOTS = _NUMBERS.negligible, _NUMBERS.tie, _NUMBERS.pivots
+# of a column's largest entry: a smaller one is no pivot (far above rounding errors)
+NEGLIGIBLE = 1e-11
+TIE = 1e-12  # ratios that differ by less are equal (far above rounding errors)
+PIVOTS = 50  # pivots per unknown
 
 
 class NoSolutionError(ArithmeticError):
@@ -157,7 +158,8 @@ def solve_pivoted(A: Array, b: Array, n: int) -> bool:
     return True
 
 
-ROUNDING, SWAPS = Complementarity.current().rounding, Complementarity.current().swaps
+ROUNDING = 1e-11  # of a row's terms: a smaller violation is none (far above rounding errors)
+SWAPS = 6  # changes of the active set before Lemke's method takes over
 
 
 @kernel

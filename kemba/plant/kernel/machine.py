@@ -9,6 +9,17 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
+GAMMA = 1.0 - 0.5**0.5  # of ROS2, which is L-stable with it; no tuning number
+# How long steps of a simulation are, where none is asked for.
+# largest difference between both stages, in `speed`, `spin` or an effect state's scale (apexes
+# agree with steps of 12.5 us within 0.005 mm (docs/plant.md))
+TOLERANCE = 3e-5
+SPEED = 1.0  # m.s-1; usual speed of a jump
+SPIN = 5.0  # rad.s-1; usual turning rate of a jump
+SHORTEST_STEP = 2.5e-5  # s; shortest step
+FIRST_STEP = 1e-4  # s; first step
+LONGEST_STEP = 5e-4  # s; longest step (1 ms would step over a touch and release within it)
+
 
 class KernelModel(NamedTuple):
     """A model as the kernel sees it.

@@ -9,7 +9,6 @@ from kemba.plant.kernel.contact import evaluate, evaluate_pairs, instant, set_ga
 from kemba.plant.kernel.events import CLOSED, Impacts, advance, collide
 from kemba.plant.kernel.jit import entry, part
 from kemba.plant.kernel.machine import Array, KernelModel, Memory, State
-from kemba.plant.kernel.settings import ContactEvents
 from kemba.plant.kernel.step import Pace
 
 
@@ -53,7 +52,8 @@ def limited(tau: float, w: float, limits: Array) -> float:
 
 
 DONE, FULL, ASK, EXPLODED, BURIED = 0, 1, 2, 3, 4  # why the kernel comes back
-HELD, DEEP = ContactEvents.current().held, ContactEvents.current().deep
+DEEP = 5e-3  # m; what starts deeper in the ground or a stop is a mistake
+HELD = 1e-4  # s; time over which recorded forces hold the pairs
 
 
 class Marks(NamedTuple):

@@ -19,11 +19,11 @@ from typing import NamedTuple
 from kemba.plant.kernel.contact import add_forces, evaluate, evaluate_pairs, remember_push, set_gaps
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.lcp import factor, solve
-from kemba.plant.kernel.machine import Array, KernelModel, Memory, State
-from kemba.plant.kernel.settings import GAMMA, GapDrift, StepControl
+from kemba.plant.kernel.machine import GAMMA, Array, KernelModel, Memory, State
 
-_DRIFT = GapDrift.current()
-PULL_BACK, SHORTEST, FASTEST = _DRIFT.share, _DRIFT.shortest, _DRIFT.fastest
+PULL_BACK = 0.2  # share of the drift that one step removes
+SHORTEST = 1e-5  # s; shorter steps remove no more (rounding would become speed)
+FASTEST = 0.05  # m.s-1; largest speed of a foot that starts below the ground
 
 
 @kernel
@@ -132,8 +132,11 @@ def _pull_back(m: KernelModel, k: Memory, h: float) -> None:
             k.pairs[m.gaps[i], m.n + m.nl] += max(drift, -FASTEST)
 
 
-_CONTROL = StepControl.current()
-GROWTH, SHRINKING, SAFETY = _CONTROL.growth, _CONTROL.shrinking, _CONTROL.safety
+GROWTH = 2.0  # largest growth from one step to the next
+SHRINKING = 0.3  # smallest share of the last step
+# share of the length at which the tolerance is just met (literature: Hairer, Norsett and Wanner
+# 1993, II.4: 0.8 to 0.9)
+SAFETY = 0.9
 
 
 class Pace(NamedTuple):
