@@ -36,10 +36,10 @@ from kemba.identify.robot.problem import robot_problem
 from kemba.identify.workflow import write_answer
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
-from kemba.plant import Commands, Profile, run
-from kemba.plant.commands import JointControl
+from kemba.plant.commands import Commands, JointControl, Profile
 from kemba.plant.controller import Gains
 from kemba.plant.repeat import Sensors, take_log
+from kemba.plant.simulate import run
 from kemba.trajectory import Trajectory
 
 ROOT = Path(__file__).parents[1]

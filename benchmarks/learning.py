@@ -40,7 +40,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
 from kemba.plotting.source import load_machine
-from kemba.report import solve_into
+from kemba.report.solving import solve_into
 from kemba.runs import RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of

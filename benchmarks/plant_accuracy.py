@@ -15,8 +15,8 @@ import numpy as np
 
 from kemba.events import peak
 from kemba.model import Model, load_model
-from kemba.plant import Commands, Profile, Simulated, run
-from kemba.plant.commands import Sense
+from kemba.plant.commands import Commands, Profile, Sense
+from kemba.plant.simulate import Simulated, run
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

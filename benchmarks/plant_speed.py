@@ -25,8 +25,10 @@ from kemba.effects.mechanics.ground import GroundFriction
 from kemba.effects.mechanics.load import Payload
 from kemba.events import peak
 from kemba.ocp import controller_table, load_task, plan
-from kemba.plant import Execution, execute, execute_many, replay, replays
+from kemba.plant.certificate import replays
+from kemba.plant.controller import Execution, execute, execute_many
 from kemba.plant.repeat import counterpart
+from kemba.plant.replay import replay
 from kemba.sweep.farm import machine
 from kemba.trajectory import Trajectory
 
@@ -40,7 +42,7 @@ begin = time.process_time()
 import numba, kemba.plant.player
 imported = time.process_time()
 from kemba.model import load_model
-from kemba.plant import run
+from kemba.plant.simulate import run
 model = load_model("plant")
 ready = time.process_time()
 run(model, {}, None, 0.001)

@@ -15,7 +15,8 @@ from pathlib import Path
 from kemba.plant import tables
 from kemba.plant.characterise import characterise
 from kemba.plant.rigs import bench_model, load_rig, run_rig
-from kemba.plotting import plot_rig, save_figure
+from kemba.plotting import plot_rig
+from kemba.plotting.style import save_figure
 from kemba.trajectory import Trajectory
 
 RIGS = ("locked", "volumes", "dynamometer", "random")

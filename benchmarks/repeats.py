@@ -17,8 +17,8 @@ from matplotlib.figure import Figure
 
 from kemba.learn.correction import flight_of
 from kemba.plant.repeat import plant_of, repeat_run
-from kemba.plotting import load_machine, save_figure
-from kemba.plotting.style import COLOURS, SHADE, key_above, paper_figure, paper_style
+from kemba.plotting.source import load_machine
+from kemba.plotting.style import COLOURS, SHADE, key_above, paper_figure, paper_style, save_figure
 from kemba.runs import load_run
 from kemba.trajectory import Trajectory
 

@@ -20,7 +20,7 @@ from block import printed, put_block
 
 from kemba.ocp import load_task
 from kemba.ocp.continuation.between import Origin
-from kemba.report import solve_into
+from kemba.report.solving import solve_into
 from kemba.runs import RunFolder
 from kemba.solve import Approach, Listener, best_plan
 from kemba.solve.earlier import origin_of

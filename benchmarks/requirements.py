@@ -24,7 +24,7 @@ from kemba.config import Document, load_text
 from kemba.errors import KembaError
 from kemba.ocp import load_task
 from kemba.ocp.task.task import parse_task
-from kemba.report import solve_into
+from kemba.report.solving import solve_into
 from kemba.runs import RunFolder
 from kemba.scenarios.share import wilson
 from kemba.solve import Approach, Listener

@@ -18,7 +18,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the CLI does
 import numpy as np
 
 from kemba.ocp import load_task
-from kemba.plotting import plot_growth, save_figure
+from kemba.plotting.studies import plot_growth
+from kemba.plotting.style import save_figure
 from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 

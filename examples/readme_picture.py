@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageSequence
 
 import kemba
-from kemba.plotting import load_machine, load_source
-from kemba.plotting.source import poses
+from kemba.plotting.source import load_machine, load_source, poses
 from kemba.plotting.sticks import StickFigure, draw_ground
 from kemba.plotting.style import BLUE, GREEN, GREY, INK, VERMILLION, paper_style
 

@@ -11,7 +11,8 @@ import pytest
 from kemba.effects import BY_KIND, Effect
 from kemba.effects.catalogue import SENSORS, OrificeChamber, PistonDamping
 from kemba.model import Model, load_model
-from kemba.plant import Commands, Profile, simulate
+from kemba.plant.commands import Commands, Profile
+from kemba.plant.simulate import simulate
 
 pytest.importorskip("numba")
 from twin import figures

@@ -160,7 +160,8 @@ def _draw(
     found: Characteristics, logs: dict[str, Trajectory], folder: Path, model: str
 ) -> list[str]:
     """The figure of each rig among the logs; what was fitted predicts random motion."""
-    from kemba.plotting import plot_rig, save_figure
+    from kemba.plotting import plot_rig
+    from kemba.plotting.style import save_figure
 
     rigs: dict[str, dict[str, Trajectory]] = {}
     for name, log in logs.items():

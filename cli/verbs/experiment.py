@@ -101,7 +101,7 @@ def _on_robot(answer: Path, path: Path, certify: bool, progress: Progress) -> di
 def _planned(found: MotionProposal, tried: Tried, path: Path, progress: Progress) -> dict[str, Any]:
     """A plan of one of the motions, in a run folder of its own, with its certificate."""
     from kemba.ocp import load_task
-    from kemba.report import solve_into
+    from kemba.report.solving import solve_into
     from kemba.runs import RunFolder
     from kemba.solve import Listener
 

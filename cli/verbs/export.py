@@ -52,7 +52,7 @@ def export(
     if out is None:
         raise typer.BadParameter("a file was expected, such as jump.mat", param_hint="--out")
     from kemba.logs import load_map
-    from kemba.plotting import load_source
+    from kemba.plotting.source import load_source
     from kemba.report.export import export as write
 
     source = load_source(run)

@@ -43,10 +43,11 @@ def plot(
 
     Example: kemba-opt plot runs/jump-1
     """
-    from kemba import plotting
     from kemba.folders import fresh, next_free
     from kemba.logs import load_map
-    from kemba.plotting.style import open_window, show_windows
+    from kemba.plotting import bench_logs, draw, load_sources, plot_rig
+    from kemba.plotting.source import default_path, machine_of
+    from kemba.plotting.style import open_window, save_figure, show_windows
     from kemba_cli.next_steps import after_plot, say_next
 
     for path, option in ((out, "--out"), (animate, "--animate")):
@@ -54,21 +55,23 @@ def plot(
             fresh(path, force, option)
     runs = runs or [newest(quiet)]
     window = open_window() if show else None
-    logs = plotting.bench_logs(runs[0]) if len(runs) == 1 else {}
+    logs = bench_logs(runs[0]) if len(runs) == 1 else {}
     if logs and animate:
         raise typer.BadParameter("bench logs have no motion to animate", param_hint="--animate")
     if logs:
-        figure = plotting.plot_rig(logs, model or "planning", figure=window)
+        figure = plot_rig(logs, model or "planning", figure=window)
         names, beside = list(logs), runs[0] / "figure.png"
     else:
-        sources = plotting.load_sources(runs, load_map(column_map) if column_map else None)
-        figure = plotting.draw(sources, model, window)
-        names, beside = [source.name for source in sources], plotting.default_path(sources)
+        sources = load_sources(runs, load_map(column_map) if column_map else None)
+        figure = draw(sources, model, window)
+        names, beside = [source.name for source in sources], default_path(sources)
     path = out or (beside if force else next_free(beside))
-    written = {"figure": plotting.save_figure(figure, path)}
+    written = {"figure": save_figure(figure, path)}
     if animate:
-        machine = plotting.machine_of(sources[0], model)
-        written["animation"] = plotting.save_animation(sources[0], machine, animate)
+        from kemba.plotting.sticks import save_animation
+
+        machine = machine_of(sources[0], model)
+        written["animation"] = save_animation(sources[0], machine, animate)
     paths = {kind: str(path) for kind, path in written.items()}
     if json:
         print_json({**paths, "runs": names})

@@ -83,8 +83,7 @@ def solve(
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.reading import asked_of
     from kemba.plant.simulate import load_meanwhile
-    from kemba.report import solve_into
-    from kemba.report.solving import drawer
+    from kemba.report.solving import drawer, solve_into
     from kemba.runs import RunFolder
     from kemba.solve import Approach, Listener
     from kemba_cli.next_steps import after_solve, say_next

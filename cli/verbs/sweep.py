@@ -111,7 +111,8 @@ def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) ->
             continue
         import numpy as np
 
-        from kemba.plotting import plot_robustness, save_figure
+        from kemba.plotting.studies import plot_robustness
+        from kemba.plotting.style import save_figure
 
         ranks = {
             key: {answer: told and told["correlation"] for answer, told in pair.items()}

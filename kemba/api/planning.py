@@ -24,7 +24,7 @@ from kemba.model.spec import model_files
 from kemba.ocp import Task
 from kemba.ocp import load_task as load_with_document
 from kemba.plant.repeat import Repeat, kept, plant_of, repeat_run
-from kemba.report import solve_into
+from kemba.report.solving import solve_into
 from kemba.runs import Run, RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.stopwatch import Tell, silent

@@ -293,23 +293,16 @@ def complaints(
     kept = [
         _merged(entries, document)
         for place, entries in found.items()
-        if not (_all_types(entries) and _any_below(place, found))
+        if not (
+            all(entry.kind in EXPECTED for entry in entries)
+            and any(len(other) > len(place) and other[: len(place)] == place for other in found)
+        )
     ]
     last = (len(document.lines), 0)
     kept.sort(key=lambda pair: document.marks.get(document.nearest(pair[0]), last))
     more = error.error_count() - MOST
     rest = [KembaError(document.source, f"and {more} more mistakes")] if more > 0 else []
     return [*(report for _, report in kept), *rest]
-
-
-def _all_types(entries: list[Complaint]) -> bool:
-    """Whether a union's branches only say that they are of another type."""
-    return all(entry.kind in EXPECTED for entry in entries)
-
-
-def _any_below(place: Location, found: dict[Location, list[Complaint]]) -> bool:
-    """Whether another branch of the union got further, so that its error is the one to show."""
-    return any(len(other) > len(place) and other[: len(place)] == place for other in found)
 
 
 def _merged(entries: list[Complaint], document: Document) -> tuple[Location, KembaError]:

@@ -36,7 +36,7 @@ from kemba.ocp import Task, load_task, task_model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
 from kemba.plotting.source import Machine, load_machine
-from kemba.report import solve_into
+from kemba.report.solving import solve_into
 from kemba.runs import Run, RunFolder, load_run, write_json
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of

@@ -73,7 +73,14 @@ def shared(groups: Iterable[Group]) -> list[Group]:
             {path + name: values for name, values in group.columns.items()},
             {path + name: unit for name, unit in group.units.items()},
         )
-        same = next((i for i, g in enumerate(found) if _same_clock(g, own)), None)
+        same = next(
+            (
+                i
+                for i, g in enumerate(found)
+                if (g.time_unit == own.time_unit and np.array_equal(g.time, own.time))
+            ),
+            None,
+        )
         if same is None:
             found.append(own)
             continue
@@ -118,7 +125,3 @@ def _clock_of(vectors: Mapping[str, Column], length: int) -> str | None:
         ),
         None,
     )
-
-
-def _same_clock(a: Group, b: Group) -> bool:
-    return a.time_unit == b.time_unit and np.array_equal(a.time, b.time)

@@ -312,8 +312,10 @@ def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteris
     effects = fitted_effects(cylinder, table, lines, plateaus)
     check = {}
     for name, log in logs.items():
-        if np.ptp(log["piston/x"]) > 1e-3 and _switches(log):
-            check[name] = _compare(cylinder, effects, log)
+        if np.ptp(log["piston/x"]) > 1e-3 and any(
+            np.ptp(log[f"valve/{chamber}"]) > 0.5 for chamber in ("extend", "retract")
+        ):
+            check[name] = agreement(predict(cylinder, effects, log), log)
     return Characteristics(cylinder, table, lines, plateaus, check)
 
 
@@ -367,10 +369,6 @@ def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
     return {key: mean(np.array(values)) for key, values in groups.items()}
 
 
-def _compare(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> tuple[float, float]:
-    return agreement(predict(cylinder, effects, log), log)
-
-
 def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
     """R2 and RMS [N] of a predicted force on a log of the same times."""
     error = predicted["piston/F"] - log["piston/F"]
@@ -384,10 +382,6 @@ def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Tr
     model = Model(rig_mechanism(cylinder), effects, supply, "bench")
     valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)
-
-
-def _switches(log: Trajectory) -> bool:
-    return any(np.ptp(log[f"valve/{chamber}"]) > 0.5 for chamber in ("extend", "retract"))
 
 
 def _check_columns(name: str, log: Trajectory) -> None:

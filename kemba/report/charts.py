@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kemba.identify.logs.clock import in_plans_clock
-from kemba.plotting import Source, load_source
+from kemba.plotting.source import Source, load_source
 from kemba.runs import PLANT_RUN, Run
 from kemba.trajectory import Array, Trajectory
 

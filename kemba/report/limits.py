@@ -13,7 +13,7 @@ from kemba.effects.mechanics.motor import Motor
 from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.mechanism import Cylinder
 from kemba.model import Model
-from kemba.plotting import Machine
+from kemba.plotting.source import Machine
 from kemba.report.charts import Book, Chart, Curve, Track, colour, table
 from kemba.report.motion import Events
 from kemba.report.use import (

@@ -20,8 +20,7 @@ from kemba.events import (
     read,
     turned,
 )
-from kemba.plotting import Machine
-from kemba.plotting.source import EXACT, stance_spans
+from kemba.plotting.source import EXACT, Machine, stance_spans
 from kemba.report.charts import Book, Chart, Curve, Spans, Track, on_grid, plan_of
 from kemba.trajectory import Trajectory
 

@@ -96,7 +96,10 @@ def write_program(named: Named, folder: Path) -> list[Path]:
         "lbx": named.program.lower, "ubx": named.program.upper,
         "lbg": named.program.g_lower, "ubg": named.program.g_upper,
     }  # fmt: skip
-    facts: dict[str, Any] = {key: _finite(value) for key, value in bounds.items()}
+    facts: dict[str, Any] = {
+        key: [float(v) if np.isfinite(v) else None for v in value.ravel()]
+        for key, value in bounds.items()
+    }
     facts |= {"x0": named.start.tolist(), "p": list(named.parameters), "rows": list(named.rows)}
     head = {"program": named.name, "functions": list(FUNCTIONS), "casadi": ca.CasadiMeta.version()}
     write_json(numbers, {**head, **facts})
@@ -118,7 +121,3 @@ def export_nlp(source: Path, folder: Path, force: bool = False) -> list[Path]:
             fresh(folder / f"{name}{ending}", force)
     listed = list(programs(task, document, plan))
     return [path for named in listed for path in write_program(named, folder)]
-
-
-def _finite(values: np.ndarray) -> list[float | None]:
-    return [float(v) if np.isfinite(v) else None for v in values.ravel()]

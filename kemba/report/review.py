@@ -19,7 +19,7 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
 from kemba.model import build_model, load_spec
-from kemba.plotting import Machine, load_machine
+from kemba.plotting.source import Machine, load_machine
 from kemba.policy.modes import PolicySettings
 from kemba.quantity import to_si
 from kemba.report.charts import Book, Rows, Track, folded, gather, grid_of, pairs, plan_of, section
@@ -348,7 +348,11 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
     parts = [verdict.html()]
     if tracks:
         book = Book(grid_of(tracks), tracks, marks_of(events))
-        motion = _robot_parts(given, book, machine) if machine else _rig_parts(book)
+        motion = (
+            _robot_parts(given, book, machine)
+            if machine
+            else [section("Tests", book.key(), rig_charts(book))]
+        )
         parts += [section("Events", event_table(tracks, events)), *motion]
         parts.append(_errors(given, book))
     parts.append(_found(given))
@@ -394,10 +398,6 @@ def _stage(shown: Track | None, plan: Track | None, model: str) -> str:
         return stage(shown.source, model, ghost, shown.name)
     except KembaError:
         return '<p class="soft">The motion cannot be shown in 3-D: columns are missing.</p>'
-
-
-def _rig_parts(book: Book) -> list[str]:
-    return [section("Tests", book.key(), rig_charts(book))]
 
 
 def _errors(given: Material, book: Book) -> str:

@@ -132,8 +132,9 @@ def drawer(wanted: bool) -> Iterator[Drawer]:
 
 def draw_plan(plan: Trajectory, folder: Path) -> None:
     """Write the figure of a plan into its run folder. Raises KembaError."""
-    from kemba.plotting import draw, save_figure
+    from kemba.plotting import draw
     from kemba.plotting.source import PLAN_FILE, Source
+    from kemba.plotting.style import save_figure
 
     source = Source(folder.name, plan, plan=True, path=folder / PLAN_FILE)
     save_figure(draw([source]), folder / FIGURE)

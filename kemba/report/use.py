@@ -13,8 +13,7 @@ from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, TEMPERATURE
 from kemba.identify.problem.noise import difference_sigma
 from kemba.mechanism import Cylinder
 from kemba.model import Model
-from kemba.plotting import Machine
-from kemba.plotting.source import EXACT, Mask
+from kemba.plotting.source import EXACT, Machine, Mask
 from kemba.report.charts import Track
 from kemba.trajectory import Array, Trajectory
 

@@ -13,10 +13,10 @@ from kemba.errors import ConfigErrors, KembaError
 from kemba.files import sha256
 from kemba.model import Model
 from kemba.ocp.task.task import parse_task
-from kemba.plant import Gains, Replay, execute
 from kemba.plant.commands import scattered
-from kemba.plant.controller import read_controller
+from kemba.plant.controller import Gains, execute, read_controller
 from kemba.plant.repeat import PLAIN, counterpart
+from kemba.plant.replay import Replay
 from kemba.runs import load_run
 from kemba.scenarios.conditions import Conditions, changed_effects, standing, start_offsets
 from kemba.scenarios.draw import sample

@@ -24,7 +24,7 @@ from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs
 from kemba.identify.written.adopt import adopt_effect
 from kemba.model.spec import load_model, load_spec
-from kemba.plant import Profile
+from kemba.plant.commands import Profile
 from kemba.plant.rigs import drive, hermite
 from kemba.trajectory import Trajectory
 

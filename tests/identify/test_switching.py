@@ -8,8 +8,7 @@ import pytest
 from kemba.effects.pneumatics.switching import changes, delayed, instants, is_on, pulses
 from kemba.identify.robot.dynamics.air import substeps
 from kemba.identify.robot.motion.resampled import ResampledLog
-from kemba.plant import Profile
-from kemba.plant.commands import acting
+from kemba.plant.commands import Profile, acting
 
 TIME = np.arange(400) / 1e3
 UNSTATED = (np.full(1, np.nan), np.zeros(1, dtype=bool))  # of the noise

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from kemba.model import Model, load_model
-from kemba.plant import Commands, Profile, Simulated, run
-from kemba.plant.commands import Sense
+from kemba.plant.commands import Commands, Profile, Sense
+from kemba.plant.simulate import Simulated, run
 
 FEMUR, TIBIA = 0.242, 0.234  # m
 AIRBORNE = {

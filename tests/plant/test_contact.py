@@ -8,9 +8,10 @@ from plant.scripts import drop, jump, planning
 
 from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.events import peak
-from kemba.plant import Commands, Profile, run, simulate
+from kemba.plant.commands import Commands, Profile
 from kemba.plant.equations import equations_of
 from kemba.plant.kernel.events import CLOSED
+from kemba.plant.simulate import run, simulate
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")

@@ -13,8 +13,9 @@ from kemba.mechanism import load_robot, robot_mechanism
 from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.robot import tree_angles
 from kemba.model import Model
-from kemba.plant import Commands, Profile, run, simulate
+from kemba.plant.commands import Commands, Profile
 from kemba.plant.equations import equations_of
+from kemba.plant.simulate import run, simulate
 from kemba.trajectory import Trajectory
 
 

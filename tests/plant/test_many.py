@@ -11,8 +11,9 @@ from kemba.effects.mechanics.ground import GroundFriction
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.plant import Commands, Condition, Profile, Simulated, run, run_many
+from kemba.plant.commands import Commands, Profile
 from kemba.plant.equations import equations_of
+from kemba.plant.simulate import Condition, Simulated, run, run_many
 
 PUSH = Commands({f"{leg}/valve/extend": Profile.pulses((0.0, 0.1)) for leg in ("front", "rear")})
 

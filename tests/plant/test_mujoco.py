@@ -14,8 +14,7 @@ from kemba.effects.mechanics.contact import Contact
 from kemba.mechanism import Link, Robot, load_robot, robot_mechanism
 from kemba.mechanism.robot import tree_angles
 from kemba.model import Model
-from kemba.plant import simulate
-from kemba.plant.simulate import initial_values
+from kemba.plant.simulate import initial_values, simulate
 
 STEP = 2e-5  # s
 HINGE = 'type="hinge" axis="0 -1 0"'

@@ -8,7 +8,7 @@ from plant.scripts import drop, jump, planning
 
 from kemba.events import peak
 from kemba.model import load_model
-from kemba.plant import run
+from kemba.plant.simulate import run
 
 
 def test_chosen_steps_are_as_exact_as_short_ones() -> None:

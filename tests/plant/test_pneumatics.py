@@ -11,7 +11,7 @@ from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model
-from kemba.plant import Profile
+from kemba.plant.commands import Profile
 from kemba.plant.rigs import drive, hermite, locked
 
 CYLINDER = load_cylinder("dsnu-25-70")

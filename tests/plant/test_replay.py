@@ -8,12 +8,13 @@ import pytest
 from plant.scripts import jump, planning
 
 from kemba.effects.mechanics.motor import Motor
-from kemba.plant import Gains, Profile, Simulated, execute, replay, replays, run
-from kemba.plant.commands import Commands
-from kemba.plant.controller import hip_control, motor_limits
+from kemba.plant.certificate import replays
+from kemba.plant.commands import Commands, Profile
+from kemba.plant.controller import Gains, execute, hip_control, motor_limits
 from kemba.plant.kernel.jit import entry
 from kemba.plant.kernel.play import limited
-from kemba.plant.replay import judge
+from kemba.plant.replay import judge, replay
+from kemba.plant.simulate import Simulated, run
 from kemba.trajectory import Trajectory
 
 

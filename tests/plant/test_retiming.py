@@ -10,7 +10,7 @@ from ocp.runs import solved
 
 from kemba.ocp import controller_table, load_task
 from kemba.ocp.planning import plan
-from kemba.plant import execute
+from kemba.plant.controller import execute
 from kemba.plant.retiming import (
     ExecutedTable,
     RetimingSettings,

@@ -19,7 +19,7 @@ from twin.valves import VALVES
 
 from kemba.mechanism import load_robot
 from kemba.model import Model, load_model
-from kemba.plant import Gains, execute
+from kemba.plant.controller import Gains, execute
 from kemba.trajectory import Trajectory
 
 GAINS = Gains(150.0, 3.0)

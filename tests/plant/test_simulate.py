@@ -6,7 +6,8 @@ from plant.scripts import jump, planning
 
 from kemba.errors import KembaError
 from kemba.model import load_model
-from kemba.plant import Commands, Profile, simulate
+from kemba.plant.commands import Commands, Profile
+from kemba.plant.simulate import simulate
 
 
 def test_the_same_again() -> None:

@@ -5,8 +5,7 @@ import pytest
 
 from kemba.effects.pneumatics.timing import ValveCloseDelay
 from kemba.model import load_model
-from kemba.plant import Profile
-from kemba.plant.commands import acting
+from kemba.plant.commands import Profile, acting
 from kemba.plant.rigs import drive, locked
 
 

@@ -10,7 +10,7 @@ import pytest
 from kemba.effects.pneumatics.chamber import Chamber
 from kemba.mechanism import load_robot
 from kemba.mechanism.robot import standing_pose
-from kemba.plotting import Machine, Source, load_machine
+from kemba.plotting.source import Machine, Source, load_machine
 from kemba.trajectory import Array, Trajectory
 
 TAKEOFF, LANDING, END = 0.20, 0.49, 0.70  # s

@@ -5,17 +5,10 @@ import pytest
 from matplotlib.text import Annotation
 
 from kemba.errors import KembaError
-from kemba.plotting import (
-    Band,
-    Source,
-    draw,
-    plot_bands,
-    plot_bench,
-    plot_force_velocity,
-    plot_heat_map,
-    plot_ladder,
-    valve_modes,
-)
+from kemba.plotting import draw
+from kemba.plotting.comparison import Band, plot_bands, plot_heat_map, plot_ladder
+from kemba.plotting.motion import plot_bench, plot_force_velocity, valve_modes
+from kemba.plotting.source import Source
 from kemba.trajectory import Trajectory
 
 TIME = np.linspace(0.0, 1.0, 101)

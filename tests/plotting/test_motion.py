@@ -11,16 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from kemba.errors import KembaError
-from kemba.plotting import (
-    Machine,
-    Source,
-    draw,
-    load_source,
-    machine_of,
-    plot_motion,
-    save_figure,
-)
-from kemba.plotting.source import stance_spans
+from kemba.plotting import draw
+from kemba.plotting.motion import plot_motion
+from kemba.plotting.source import Machine, Source, load_source, machine_of, stance_spans
+from kemba.plotting.style import save_figure
 from kemba.trajectory import Trajectory
 
 LABELS = {

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.plotting import Source, default_path, load_source, load_sources
+from kemba.plotting import load_sources
+from kemba.plotting.source import Source, default_path, load_source
 from kemba.trajectory import Trajectory
 
 SWITCHED = Trajectory([0.0, 1.0, 2.0, 3.0], {"valve [1]": [1.0, 0.0, 1.0, 1.0]})

@@ -8,8 +8,8 @@ from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 from kemba.errors import KembaError
-from kemba.plotting import Machine, Source, animate, save_animation
-from kemba.plotting.source import poses
+from kemba.plotting.source import Machine, Source, poses
+from kemba.plotting.sticks import animate, save_animation
 
 
 def distance(points: dict[str, np.ndarray], start: str, end: str) -> float:

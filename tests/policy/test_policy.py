@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.model import Model, load_model
-from kemba.plant import execute
 from kemba.plant.commands import Profile
+from kemba.plant.controller import execute
 from kemba.plant.repeat import Sensors
 from kemba.policy import player
 from kemba.policy.course import course_of

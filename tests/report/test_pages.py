@@ -15,7 +15,7 @@ from typer.testing import CliRunner, Result
 from kemba.config import shipped_configs
 from kemba.identify.logs.reading import read_log
 from kemba.logs import load_map
-from kemba.plotting import load_source
+from kemba.plotting.source import load_source
 from kemba.report.view import scene, script_text, stage
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app

@@ -17,7 +17,7 @@ from kemba.files import read_json
 from kemba.identify.answer import ENDED, read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.mechanism import load_robot
-from kemba.plotting import Source, load_machine
+from kemba.plotting.source import Source, load_machine
 from kemba.report.charts import Track, gather, grid_of, on_grid
 from kemba.report.limits import event_table
 from kemba.report.model_error import answer_parts

@@ -13,10 +13,11 @@ from typer.testing import CliRunner
 
 from kemba.files import WriteError
 from kemba.ocp import load_task, task_model
-from kemba.plant import execute, replay
 from kemba.plant.certificate import SETTLE
+from kemba.plant.controller import execute
 from kemba.plant.repeat import counterpart
-from kemba.report import solve_into
+from kemba.plant.replay import replay
+from kemba.report.solving import solve_into
 from kemba.runs import RunFolder
 from kemba.solve import Approach, Listener
 from kemba.trajectory import Trajectory

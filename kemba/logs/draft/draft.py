@@ -113,7 +113,11 @@ def _header(above: list[str], separator: str, width: int) -> tuple[int, int]:
     equal ones; with the lines above it where names repeat and these tell them apart.
     """
     rows = {i: cells_of(line, separator) for i, line in enumerate(above) if line.strip()}
-    wide = [i for i, cells in rows.items() if _wide(cells, width)]
+    wide = [
+        i
+        for i, cells in rows.items()
+        if (len(cells) == width or (len(cells) == width - 1 and all(cells)))
+    ]
     if not wide:
         return 0, 0
     best = max(wide, key=lambda i: (_different(rows[i]), -i))
@@ -122,11 +126,6 @@ def _header(above: list[str], separator: str, width: int) -> tuple[int, int]:
         if _different(together) > _different(rows[best]) and best - first < len(wide):
             return first, best - first + 1
     return best, 1
-
-
-def _wide(cells: Sequence[str], width: int) -> bool:
-    """Whether a line has a name for each column; the last may end in an empty cell."""
-    return len(cells) == width or (len(cells) == width - 1 and all(cells))
 
 
 def _different(cells: Sequence[str]) -> int:
@@ -248,12 +247,11 @@ def _kind(
     if says("part", "valve"):
         return "bench", bench_targets()
     if says("kind", "pressure"):
-        return "cylinder", [_optional(target) for target in bench_targets()]
+        return "cylinder", [
+            replace(target, needed=target.needed and (not target.is_valve))
+            for target in bench_targets()
+        ]
     return "drive", drive_targets(rotary=says("kind", "torque"))
-
-
-def _optional(target: Target) -> Target:
-    return replace(target, needed=target.needed and not target.is_valve)
 
 
 def _sources(
