@@ -31,12 +31,7 @@ S = TypeVar("S", bound="Settings")
 
 
 def setting(
-    value: Any,
-    unit: str,
-    doc: str,
-    origin: str,
-    decides: bool = False,
-    at_most: float = math.inf,
+    value: Any, unit: str, doc: str, origin: str, decides: bool = False, at_most: float = math.inf
 ) -> Any:
     """A field of `Settings`.
 

@@ -34,8 +34,7 @@ def discover(
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
     figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
     figure: Annotated[  # what the option was called before
-        bool,
-        typer.Option("--figures/--no-figures", hidden=True, help="Earlier name of --figure."),
+        bool, typer.Option("--figures/--no-figures", hidden=True, help="Earlier name of --figure.")
     ] = True,
     force: Force = False,
     own_effects: OwnEffects = None,

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 def simulate(
     source: Annotated[
-        str | None,
-        typer.Argument(help="Run folder, controller.csv, or rig YAML (the newest run)."),
+        str | None, typer.Argument(help="Run folder, controller.csv, or rig YAML (the newest run).")
     ] = None,
     model: Annotated[
         str | None, typer.Option(help="Model YAML of the plant; else the task's own.")

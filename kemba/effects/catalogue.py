@@ -47,14 +47,7 @@ from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.effects.pneumatics.timing import ValveCloseDelay, ValveDelay
 from kemba.effects.pneumatics.valve import Valve
 from kemba.effects.registry import Registry
-from kemba.effects.rigs.axis import (
-    AxisLag,
-    AxisOffset,
-    AxisScale,
-    Cogging,
-    DriveAxis,
-    ExtraInertia,
-)
+from kemba.effects.rigs.axis import AxisLag, AxisOffset, AxisScale, Cogging, DriveAxis, ExtraInertia
 from kemba.effects.rigs.chambers import MeasuredChambers
 from kemba.effects.rigs.friction import (
     AxisDamping,

@@ -85,10 +85,7 @@ def _spread(table: Trajectory, model: Model, name: str, machine: Machine, rest: 
     return float(apex.std(ddof=1)) if len(apex) >= FEWEST else 0.0
 
 
-LACKS = {
-    "partly": ", and something more that is not known",
-    "missing": "",
-}
+LACKS = {"partly": ", and something more that is not known", "missing": ""}
 ELSE = {
     "nothing": "the model lacks nothing that these logs show",
     "unknown": "the model lacks something that no effect of the catalogue explains",

@@ -152,10 +152,7 @@ def rnea(joints: list[Joint], q: ca.SX, v: ca.SX, a: ca.SX, gravity: float) -> c
         tau[i] = _along(joint, motion, force[i], moment[i]) + joint.armature * a[i]
         if joint.parent >= 0:
             parent = motions[joint.parent]
-            arm = (
-                motion.position[0] - parent.position[0],
-                motion.position[1] - parent.position[1],
-            )
+            arm = (motion.position[0] - parent.position[0], motion.position[1] - parent.position[1])
             moment[joint.parent] += moment[i] + _cross(arm, force[i])
             above = force[joint.parent]
             force[joint.parent] = (above[0] + force[i][0], above[1] + force[i][1])

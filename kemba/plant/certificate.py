@@ -10,9 +10,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.events import (
-    ends_standing,
-)
+from kemba.events import ends_standing
 from kemba.model import Model, load_model
 from kemba.model.impact import felt
 from kemba.model.rest import at_rest

@@ -124,10 +124,7 @@ class Sensors:
 
 
 def take_log(
-    truth: Trajectory,
-    sensors: Sensors,
-    rng: np.random.Generator,
-    effects: Iterable[Effect] = (),
+    truth: Trajectory, sensors: Sensors, rng: np.random.Generator, effects: Iterable[Effect] = ()
 ) -> Trajectory:
     """The log of a simulated motion: its measured channels with the sensor faults among `effects`,
     then noise, then quantisation. Commands are logged as they are."""

@@ -3,12 +3,4 @@
 from kemba.scene.scene import FLAT, POINTS, Ground, Obstacle, Scene, scene_in
 from kemba.scene.terrain import AnyTerrain
 
-__all__ = [
-    "FLAT",
-    "POINTS",
-    "AnyTerrain",
-    "Ground",
-    "Obstacle",
-    "Scene",
-    "scene_in",
-]
+__all__ = ["FLAT", "POINTS", "AnyTerrain", "Ground", "Obstacle", "Scene", "scene_in"]

@@ -142,10 +142,7 @@ class Kkt:
         moved = _padded(np.where(self.mu[: len(change.upper)] > 0, change.upper, change.lower), n)
         bound = np.where(self.lam > 0, change.g_upper, change.g_lower)
         right = np.concatenate(
-            [
-                (self.pull * moved - _padded(change.gradient, n))[self.free],
-                bound - change.g,
-            ]
+            [(self.pull * moved - _padded(change.gradient, n))[self.free], bound - change.g]
         )
         given = self.fixed @ moved[~self.free]
         right -= np.concatenate([given[:n][self.free], given[n:]])

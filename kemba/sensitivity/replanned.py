@@ -81,14 +81,7 @@ def _asked(task: Task, model: Model) -> Iterator[FigureStep]:
     for name in ("height", "feet", "distance"):
         value = getattr(task, name)
         if value is not None:
-            yield FigureStep(
-                name,
-                "m",
-                float(value),
-                LENGTH,
-                False,
-                _task_with(task, model, name),
-            )
+            yield FigureStep(name, "m", float(value), LENGTH, False, _task_with(task, model, name))
 
 
 def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem]:

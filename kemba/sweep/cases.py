@@ -181,12 +181,7 @@ def perform(
             result = resolve(function)(work)
     except Exception as error:
         result = {"status": "error", "good": False, "sentence": f"{type(error).__name__}: {error}"}
-    record = {
-        **result,
-        "wall_s": working.wall,
-        "cpu_s": working.cpu,
-        "finished": time.time(),
-    }
+    record = {**result, "wall_s": working.wall, "cpu_s": working.cpu, "finished": time.time()}
     if Path(path).parent.is_dir():
         write_json(path, record)
     return record

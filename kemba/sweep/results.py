@@ -185,13 +185,7 @@ def cost_ratio(case: Case, record: Record | None, best: Mapping[str, float]) -> 
 
 
 MANIFEST = "manifest.json"
-FORMULA = (
-    "=",
-    "+",
-    "@",
-    "\t",
-    "\r",
-)  # begins of formulas in spreadsheets ("-" begins numbers too)
+FORMULA = ("=", "+", "@", "\t", "\r")  # begins of formulas in spreadsheets ("-" begins numbers too)
 FIGURES = (
     "status", "good", "sentence", "apex_m", "apex_error_m", "touchdown_error_s", "final_error_m",
     "fault", "pitch_rad", "duration_s", "solve_s", "solve_cpu_s", "build_s", "wall_s", "cpu_s",

@@ -26,10 +26,7 @@ class Payload(Effect):
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(
-            effort={
-                "body_x": -self.m * at.body_x.a,
-                "body_z": -self.m * (at.body_z.a + at.gravity),
-            }
+            effort={"body_x": -self.m * at.body_x.a, "body_z": -self.m * (at.body_z.a + at.gravity)}
         )
 
 

@@ -47,12 +47,7 @@ class Chamber(Effect):
     source: ClassVar[str] = "paper eq. 4, 5, Tables I, II"
     ports: ClassVar[tuple[str, ...]] = ("piston",)
     reads: ClassVar[tuple[str, ...]] = ("supply_gain", "droop", "rise_gain")
-    publishes: ClassVar[tuple[str, ...]] = (
-        "F_static_e",
-        "F_static_r",
-        "tau_e",
-        "tau_r",
-    )
+    publishes: ClassVar[tuple[str, ...]] = ("F_static_e", "F_static_r", "tau_e", "tau_r")
 
     nominal: ClassVar[dict[str, Tolerance]] = {
         "F_extend": OF_A_KIND,

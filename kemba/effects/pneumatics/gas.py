@@ -157,9 +157,6 @@ class VesselChamber(Effect):
         outflow = self.a * phi(P, self.outside) * ca.sqrt(TEMPERATURE / T)
         air = Air(P, self.V, 0.0, 0.0, outflow, self.wall)
         return Contribution(
-            rate={
-                "P_g": -KAPPA * GAS * T * outflow / self.V,
-                "T_g": cooling(air, T, self.ambient),
-            },
+            rate={"P_g": -KAPPA * GAS * T * outflow / self.V, "T_g": cooling(air, T, self.ambient)},
             publish={"gas": (Gas("P_g", "T_g", P, T, self.V, self.wall, self.ambient),)},
         )

@@ -142,6 +142,5 @@ class Presliding(AxisEffect):
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(
-            effort={"axis": -self.F_p * at.z},
-            rate={"z": dahl_rate(at.z, at.axis.v, self.travel)},
+            effort={"axis": -self.F_p * at.z}, rate={"z": dahl_rate(at.z, at.axis.v, self.travel)}
         )
