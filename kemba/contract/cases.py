@@ -142,13 +142,13 @@ class Placed:
         return set(self.on.ports) <= {"piston"} and self.on.kind != "end_stop"
 
 
-def points(model: Model, count: int = 6, seed: int = 1) -> Iterator[Point]:
+def points(model: Model, count: int = 6) -> Iterator[Point]:
     """States of a model: three at its borders, the others at random.
 
     At the borders: at rest, pistons retracted, feet on the ground, chambers empty or full, no
     force. Arrays by the names of `Node.NAMES` except p.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     mechanism = model.mechanism
     stand = np.array([mechanism.standing.get(c.name, 0.0) for c in mechanism.coordinates])
     states = list(model.states.values())
@@ -172,9 +172,9 @@ def points(model: Model, count: int = 6, seed: int = 1) -> Iterator[Point]:
         }
 
 
-def values_of(model: Model, point: Point, p: Any = ()) -> Point:
+def values_of(model: Model, point: Point) -> Point:
     """Every part of the residual at a point."""
-    result = model.node.residual(**point, p=list(p))
+    result = model.node.residual(**point, p=[])
     return {name: np.asarray(value).ravel() for name, value in result.items()}
 
 

@@ -58,10 +58,10 @@ def unwrapped(values: Array) -> Array:
     return found
 
 
-def wraps(values: Array, turn: float = 2 * math.pi) -> bool:
-    """Whether an angle (n,) begins anew after each `turn`: it leaps by a turn, back or forth, and
+def wraps(values: Array) -> bool:
+    """Whether an angle (n,) begins anew after each turn: it leaps by a turn, back or forth, and
     stays within one."""
-    known = values[np.isfinite(values)]
+    turn, known = 2 * math.pi, values[np.isfinite(values)]
     leaps = np.abs(np.diff(known))
     far = leaps[leaps > 0.5 * turn]
     within = np.ptp(known) < 1.1 * turn if len(known) else False

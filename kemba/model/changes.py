@@ -78,7 +78,7 @@ def _part(source: Document, key: str, effect: Effect, values: Mapping[str, Any])
 DRAWN = 40  # models: the spread is then known to a tenth
 
 
-def drawn_models(model: Model, name: str | Path, count: int = DRAWN, seed: int = 0) -> list[Model]:
+def drawn_models(model: Model, name: str | Path, count: int = DRAWN) -> list[Model]:
     """So many models drawn from the covariance of the model YAML `name` about `model`.
 
     Parameters stay within their bounds. Raises KembaError where the covariance is missing or none.
@@ -88,7 +88,7 @@ def drawn_models(model: Model, name: str | Path, count: int = DRAWN, seed: int =
     middle = np.array([_value(known, n) for n in names])
     size, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.maximum(size, 0.0))
-    steps = np.random.default_rng(seed).standard_normal((count, len(names))) @ root.T
+    steps = np.random.default_rng(0).standard_normal((count, len(names))) @ root.T
     return [_with(model, dict(zip(names, middle + step, strict=True))) for step in steps]
 
 

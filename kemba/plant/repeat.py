@@ -23,7 +23,7 @@ from kemba.model.changes import changed_effects
 from kemba.model.spec import ModelSpec, own_robot
 from kemba.plant.certificate import PLANT
 from kemba.plant.commands import scattered
-from kemba.plant.controller import Execution, Gains, execute, read_controller
+from kemba.plant.controller import Execution, execute, read_controller
 from kemba.plant.kernel.machine import Array
 from kemba.plant.replay import Replay
 from kemba.quantity import to_si
@@ -192,7 +192,6 @@ def repeat_run(
     count: int = 1,
     noise: bool = False,
     seed: int = 0,
-    gains: Gains | None = None,
     play: Play | None = None,
     tell: Tell = silent,
 ) -> list[Repeat]:
@@ -220,7 +219,7 @@ def repeat_run(
         begin = float(table.time[0])
         sample = begin + sensors.times(float(table.time[-1]) - begin, rng)
         if play is None:
-            done = execute(table, model, gains, valves=valves, sample=sample)
+            done = execute(table, model, valves=valves, sample=sample)
         else:
             done = play(model, sample, [seed, number, 1], noise)
         log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), done.table)

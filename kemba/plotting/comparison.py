@@ -50,11 +50,9 @@ class Band:
 
 
 @paper_style
-def plot_bands(
-    bands: Sequence[Band], explained: str = "explained", figure: Figure | None = None
-) -> Figure:
+def plot_bands(bands: Sequence[Band], explained: str = "explained") -> Figure:
     """Estimates such as the missing force d(t), one panel each, with bands and a line at zero."""
-    figure = paper_figure(0.95 * len(bands) + 0.55, figure=figure)
+    figure = paper_figure(0.95 * len(bands) + 0.55)
     grid = figure.subplots(len(bands), 1, squeeze=False, sharex=True)[:, 0]
     for axes, band in zip(grid, bands, strict=True):
         draw_band(axes, band, explained)
@@ -80,14 +78,10 @@ def draw_band(axes: Axes, band: Band, explained: str = "explained") -> None:
 
 @paper_style
 def plot_ladder(
-    steps: Sequence[str],
-    fitted: Sequence[float],
-    held_out: Sequence[float] | None = None,
-    floor: float = 1.0,
-    figure: Figure | None = None,
+    steps: Sequence[str], fitted: Sequence[float], held_out: Sequence[float] | None = None
 ) -> Figure:
-    """Error (noise = `floor`) as effects are added one after the other, the start model first."""
-    figure = paper_figure(0.3 * len(steps) + 0.75, 4.6, figure)
+    """Error / noise as effects are added one after the other, the start model first."""
+    figure = paper_figure(0.3 * len(steps) + 0.75, 4.6)
     axes = figure.add_subplot()
     rungs = range(len(steps))
     axes.plot(fitted, rungs, "o-", ms=4, color=GREY, label="fitted runs", zorder=3)
@@ -98,9 +92,9 @@ def plot_ladder(
                 f"{number:.2f}", (number, rung), (0, 5), textcoords="offset points",
                 ha="center", color=BLUE, fontsize=7, zorder=5,
             )  # fmt: skip
-    axes.axvline(floor, color=INK, lw=0.8, ls=DASHES, label="noise", zorder=2)
+    axes.axvline(1.0, color=INK, lw=0.8, ls=DASHES, label="noise", zorder=2)
     axes.set_xscale("log")
-    numbers = [*fitted, *(held_out if held_out is not None else ()), floor]
+    numbers = [*fitted, *(held_out if held_out is not None else ()), 1.0]
     axes.set_xlim(min(numbers) / 1.3, max(numbers) * 1.3)
     ticks = [t for t in (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if _within(t, axes)]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
@@ -129,8 +123,6 @@ def plot_heat_map(
     channels: Sequence[str],
     conditions: Sequence[Condition],
     significant: Mapping[str, Any] | None = None,
-    label: str = "error / noise",
-    figure: Figure | None = None,
 ) -> Figure:
     """Error ratios by channel and condition; 1 is the noise floor, NaN was never visited.
 
@@ -138,7 +130,7 @@ def plot_heat_map(
     other on one colour scale. `significant`: arrays of the same shape; these numbers are bold.
     """
     each = heat_height(len(channels), conditions)
-    figure = paper_figure(each * len(tables) + 0.3, figure=figure)
+    figure = paper_figure(each * len(tables) + 0.3)
     grid = figure.subplots(len(tables), 1, squeeze=False)[:, 0]
     for axes, (title, values) in zip(grid, tables.items(), strict=True):
         bold = (significant or {}).get(title, np.zeros(np.shape(values), bool))
@@ -146,7 +138,7 @@ def plot_heat_map(
         axes.set_title(title if len(tables) > 1 else "", loc="left", fontweight="bold")
         axes.set_yticks(range(len(channels)), channels)
         name_conditions(axes, conditions)
-    add_bar(figure, image, list(grid), label)
+    add_bar(figure, image, list(grid), "error / noise")
     return figure
 
 
@@ -225,7 +217,7 @@ Column = tuple[str, str, str]  # phase, mode, region
 
 
 @paper_style
-def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
+def plot_comparison(found: Comparison) -> Figure:
     """Heat map by condition (significant bins bold); d(t) with its 95 % band in the run that
     lacks most; the missing force against what it goes with."""
     tables = columns_of(found.bins)
@@ -234,7 +226,7 @@ def plot_comparison(found: Comparison, figure: Figure | None = None) -> Figure:
     channels = list(dict.fromkeys(c.channel for c in found.bins))
     heights = [len(channels) * ROW + 4 * LEVEL + 0.3] * len(tables)
     parts = [sum(heights), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
-    figure = paper_figure(sum(parts), figure=figure)
+    figure = paper_figure(sum(parts))
     rooms = figure.subfigures(3, 1, height_ratios=[max(p, 0.01) for p in parts], squeeze=False)
     heat, time, force = rooms[:, 0]
     _heat(heat, found.bins, channels, tables)

@@ -83,10 +83,10 @@ FOOT = 0.24  # in below the ground, for the times
 LARGE = 1.4  # in per metre at which lines have their full width
 
 
-def film(source: Source, machine: Machine, frames: int = FRAMES) -> list[Pose]:
+def film(source: Source, machine: Machine) -> list[Pose]:
     """Poses at even times over the whole trajectory; none when columns are missing."""
     time = source.trajectory.time
-    return poses(source, machine, np.linspace(time[0], time[-1], frames))
+    return poses(source, machine, np.linspace(time[0], time[-1], FRAMES))
 
 
 def strip_height(shown: list[Pose], machine: Machine, width: float) -> float:

@@ -103,14 +103,14 @@ def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:
 
 
 @paper_style
-def plot_residual(found: Discovery, figure: Figure | None = None) -> Figure:
+def plot_residual(found: Discovery) -> Figure:
     """Whitened residual before and after, of the channel and in the seconds where the answer
     explains most; where nothing was found, where the error is largest."""
     rows, residuals = _residuals(found)
     squares = residuals["before"] ** 2 - residuals.get("after", np.zeros(1)) ** 2
     own = _most(rows, squares)
     time = rows.time[own]
-    figure = paper_figure(2.2, figure=figure)
+    figure = paper_figure(2.2)
     axes = figure.add_subplot()
     looks: dict[str, Any] = {"before": VERMILLION, "after": BLUE}
     for title, r in residuals.items():
@@ -146,16 +146,13 @@ STYLES = ((DASHES, GREY), ("-", VERMILLION))  # before learning, after it
 
 @paper_style
 def plot_executions(
-    executed: Sequence[Trajectory],
-    expected: Mapping[str, Trajectory],
-    planned: Trajectory,
-    figure: Figure | None = None,
+    executed: Sequence[Trajectory], expected: Mapping[str, Trajectory], planned: Trajectory
 ) -> Figure:
     """Logs over the plan and over what models expect, all by the clock of the plan.
 
     `expected`: simulations by name, the one before learning first.
     """
-    figure = paper_figure(3.6, figure=figure)
+    figure = paper_figure(3.6)
     rows = figure.subplots(len(JUMP), 1, sharex=True)
     for axes, (name, label, factor) in zip(rows, JUMP, strict=True):
         for i, log in enumerate(executed):
@@ -173,13 +170,10 @@ def plot_executions(
 
 @paper_style
 def plot_rounds(
-    rounds: Sequence[int],
-    apex: Sequence[float],
-    expected: tuple[int, float] | None = None,
-    figure: Figure | None = None,
+    rounds: Sequence[int], apex: Sequence[float], expected: tuple[int, float] | None = None
 ) -> Figure:
     """Apex errors [m] of the executed runs by round, and the one `expected` of the next run."""
-    figure = paper_figure(2.0, figure=figure)
+    figure = paper_figure(2.0)
     axes = figure.add_subplot()
     axes.axhline(0.0, color=GREY, lw=0.6)
     axes.plot(rounds, 1e3 * np.asarray(apex), "o-", color=BLUE, label="executed")
@@ -198,14 +192,13 @@ def plot_robustness(
     landed: Array,
     ranks: Mapping[str, Mapping[str, float | None]],
     planned: float | None = None,
-    figure: Figure | None = None,
 ) -> Figure:
     """How high executions went and which landed, and which conditions matter.
 
     `apex` (m,) [m] and `landed` (m,) of every execution; `ranks`: rank correlations by condition,
     each with `landing` and `apex`, None where there is none; `planned` [m] is marked.
     """
-    figure = paper_figure(max(2.0, 0.7 + 0.3 * len(ranks)), figure=figure)
+    figure = paper_figure(max(2.0, 0.7 + 0.3 * len(ranks)))
     left, right = figure.subplots(1, 2)
     good = np.asarray(landed, dtype=bool)
     edges = np.histogram_bin_edges(apex, bins="auto")
@@ -245,13 +238,10 @@ def _size(found: Mapping[str, float | None]) -> float:
 
 @paper_style
 def plot_growth(
-    sizes: Array,
-    seconds: Mapping[str, Array],
-    exponents: Mapping[str, float],
-    figure: Figure | None = None,
+    sizes: Array, seconds: Mapping[str, Array], exponents: Mapping[str, float]
 ) -> Figure:
     """Solve times [s] over numbers of nodes by task, with fitted powers of N."""
-    figure = paper_figure(3.0, 4.2, figure)
+    figure = paper_figure(3.0, 4.2)
     axes = figure.add_subplot()
     for index, (name, times) in enumerate(seconds.items()):
         hue = (BLUE, VERMILLION)[index % 2]

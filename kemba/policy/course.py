@@ -181,14 +181,14 @@ class Builder:
         return found
 
 
-def course_of(model: Model, table: Trajectory, extra: float = 0.0) -> EventCourse:
-    """The linearised execution of a controller table, `extra` [s] after its last row included.
+def course_of(model: Model, table: Trajectory) -> EventCourse:
+    """The linearised execution of a controller table.
 
     Raises KembaError where the table cannot be simulated, ValueError for a model with other pairs
     than rigid contacts and stops.
     """
     table, hybrid = read_controller(table), Hybrid(model)
-    condition, begin = condition_of(table, model, extra=extra)
+    condition, begin = condition_of(table, model)
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
     acting = delayed(model, dict(commands.profiles))

@@ -173,7 +173,7 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
             [
                 escape(track.name),
                 _tops(e),
-                _or_dash(e.feet, 100, "cm", 1),
+                _or_dash(e.feet, 100, "cm"),
                 _times(e.lift_offs),
                 *(_touchdown(e, leg) for leg in legs),
                 f"<b>{escape(e.fault)}</b>" if e.fault else "upright",
@@ -258,7 +258,7 @@ def _limit_table(
                     _largest(100 * uses[i].motor, "%", 0),
                     f"{1e3 * full_for(track, uses[i].motor):.0f} ms",
                     _largest(100 * uses[i].cone, "%", 0),
-                    _or_dash(slid, 1e3, "mm", 1),
+                    _or_dash(slid, 1e3, "mm"),
                     lowest,
                 ]
             )
@@ -316,9 +316,9 @@ def _largest(values: Array, unit: str, digits: int) -> str:
     return f"{known.max():.{digits}f} {unit}" if len(known) else "-"
 
 
-def _or_dash(value: float | None, factor: float, unit: str, digits: int) -> str:
+def _or_dash(value: float | None, factor: float, unit: str) -> str:
     known = value is not None and np.isfinite(value)
-    return f"{factor * value:.{digits}f} {unit}" if known and value is not None else "-"
+    return f"{factor * value:.1f} {unit}" if known and value is not None else "-"
 
 
 def _both(work: Array | None) -> tuple[str, str]:

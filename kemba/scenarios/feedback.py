@@ -35,7 +35,7 @@ UNCERTAINTIES = "twice"  # of configs/uncertainties
 COUNT = 64  # scenarios from which feedback learns what to expect
 
 
-def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
+def executions_of(run: str | Path) -> list[Trajectory]:
     """The table of a run executed open loop on its task's plant under drawn uncertainties.
 
     Those that cannot be simulated or do not end as upright as the plan are left out. Raises
@@ -45,7 +45,7 @@ def executions_of(run: str | Path, jobs: int | None = None) -> list[Trajectory]:
     cases = scenarios(UNCERTAINTIES, plant, COUNT)
     asked = [{"model": c.model, "start": standing(c.model, table, c.start)} for c in cases]
     pitch = float(load_run(run).trajectory["body/pitch"][-1])
-    done = [d for d in execute_many(table, asked, jobs) if not isinstance(d, KembaError)]
+    done = [d for d in execute_many(table, asked) if not isinstance(d, KembaError)]
     return [d.trajectory for d in done if turned(d.trajectory["body/pitch"][-1], pitch) <= UPRIGHT]
 
 

@@ -28,9 +28,9 @@ EDGE = 0.02  # m; about the way of a foot in two steps of a plan, so that nodes 
 LEVEL = 1e-9  # m; a smaller jump between two lines is none
 
 
-def rise(x: ca.SX, begin: float, width: float = EDGE) -> ca.SX:
-    """0 before `begin` [m], 1 from `begin` + `width` on, twice continuously differentiable."""
-    u = ca.fmax(0, ca.fmin(1, (x - begin) / width))
+def rise(x: ca.SX, begin: float) -> ca.SX:
+    """0 before `begin` [m], 1 from `begin` + `EDGE` on, twice continuously differentiable."""
+    u = ca.fmax(0, ca.fmin(1, (x - begin) / EDGE))
     return u**3 * (10 - u * (15 - 6 * u))
 
 

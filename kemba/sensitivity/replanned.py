@@ -192,9 +192,7 @@ class Solution:
         return Kkt.of(self.program, self.point)
 
 
-def solution(
-    source: PlanProgram, task: Task, model: Model, control: Control | None = None
-) -> Solution:
+def solution(source: PlanProgram, task: Task, model: Model) -> Solution:
     """A plan's program solved for a task and a model. Raises KembaError where it does not
     converge."""
     options = {**warm(ITERATIONS), "tol": TOL}
@@ -202,7 +200,7 @@ def solution(
         program, x = source.built(task, model)
         if weight:
             x = program.proximal(x, weight)
-        point = solve(program, Iterate(x), options, control or Control())
+        point = solve(program, Iterate(x), options, Control())
         if point.solved:
             return Solution(source, program, point)
     assert point.ending is not None

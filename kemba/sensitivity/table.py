@@ -13,7 +13,6 @@ from kemba.errors import KembaError
 from kemba.files import atomic_text
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
-from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.task.task import Task
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute_many
@@ -46,11 +45,7 @@ class Shift:
 
 
 def of_commands(
-    model: Model,
-    plan: Trajectory,
-    table: Trajectory,
-    changed: Sequence[FigureStep],
-    jobs: int | None = None,
+    model: Model, plan: Trajectory, table: Trajectory, changed: Sequence[FigureStep]
 ) -> list[Shift]:
     """For every figure of `changed`, the difference between half a step above and half below.
 
@@ -59,7 +54,7 @@ def of_commands(
     """
     rest = rest_after(model, plan, table)
     models = [side[1] for figure in changed for side in figure.sides()]
-    done = execute_many(table, [{"model": m, "extra": rest} for m in models], jobs)
+    done = execute_many(table, [{"model": m, "extra": rest} for m in models])
     pairs = zip(done[::2], done[1::2], models[::2], models[1::2], strict=True)
     return [_difference(plan, *pair) for pair in pairs]
 
@@ -114,7 +109,6 @@ def sensitivity(
     plan: Trajectory,
     table: Trajectory,
     tell: Callable[[str], None] = lambda text: None,
-    control: Control | None = None,
     only: Sequence[str] = (),
 ) -> Sensitivity:
     """Both kinds for the figures of a task and its `model`; `only`: the names of those wanted.
@@ -130,9 +124,7 @@ def sensitivity(
     tell("the plan made anew")
     try:
         source = PlanProgram.of(task, model, plan)
-        replanned: list[Replanned | None] = [
-            *of_plan(solution(source, task, model, control), listed)
-        ]
+        replanned: list[Replanned | None] = [*of_plan(solution(source, task, model), listed)]
         why = ""
     except KembaError as error:
         replanned, why = [None] * len(listed), str(error)
