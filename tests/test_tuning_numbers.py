@@ -129,7 +129,7 @@ CONSTANTS = {  # file -> names, why
         "length of messages; longest name; width of lines",
     ),
     "logs/foreign.py": ("LONGEST", "length of messages"),
-    "logs/formats/matlab.py": ("LONGEST", "time in which a file must be read"),
+    "logs/formats/arrays.py": ("LONGEST", "time in which a file must be read"),
     "config/reader.py": ("LONGEST_NUMBER", "longest text that is read"),
     "identify/design/courses.py": ("STEEPEST", "the shape of a cubic"),
     "identify/design/robot.py": ("STANDARD", "the motion that others are compared with"),

@@ -17,7 +17,7 @@ from scipy.io import savemat
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, log_files, open_log
-from kemba.logs.formats import matlab
+from kemba.logs.formats import arrays
 from kemba.report.export import export
 from kemba.trajectory import Trajectory
 
@@ -238,13 +238,13 @@ def test_packed_zeros_end_the_reader_of_matlab_files_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With less memory than the array would take; there are 8 MB in some kilobytes."""
-    child = Path(matlab.__file__).with_name("mat_child.py").read_text(encoding="utf-8")
+    child = Path(arrays.__file__).with_name("mat_child.py").read_text(encoding="utf-8")
     other = tmp_path / "mat_child.py"
     other.write_text(child.replace("MEMORY = 6_000_000_000", "MEMORY = 50_000_000"))
-    monkeypatch.setattr(matlab, "__file__", str(tmp_path / "matlab.py"))
+    monkeypatch.setattr(arrays, "__file__", str(tmp_path / "matlab.py"))
     few, path = tmp_path / "few.mat", tmp_path / "zeros.mat"
     savemat(few, {"time": np.zeros(100)})
-    assert len(matlab.read_mat(few).columns["time"]) == 100
+    assert len(arrays.read_mat(few).columns["time"]) == 100
     savemat(path, {"time": np.zeros(1_000_000)}, do_compression=True)
     assert path.stat().st_size < 20_000
     with pytest.raises(KembaError, match=r"is no MATLAB file that can be read"):

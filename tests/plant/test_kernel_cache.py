@@ -8,7 +8,7 @@ import numba
 import pytest
 
 from kemba.plant.kernel import jit
-from kemba.plant.simulate import simulate as loading
+from kemba.plant import simulate as loading
 
 
 def twice(x: float) -> float:

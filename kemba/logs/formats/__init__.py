@@ -19,7 +19,7 @@ Read = Callable[[Path], Recording]
 Write = Callable[[Trajectory, Path], None]
 
 LARGEST = 2_000_000_000  # bytes of an unpacked log: 40 columns at 1 kHz for 1.7 hours
-MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "matlab", "npz": "arrays", "json": "arrays"}
+MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "arrays", "npz": "arrays", "json": "arrays"}
 READERS = {
     **MODULES, "db3": "rosbag2", "mf4": "measured", "mdf": "measured", "tdms": "measured",
     "ulg": "measured", "lvm": "lines", "sto": "lines", "mot": "lines",

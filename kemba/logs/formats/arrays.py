@@ -1,4 +1,4 @@
-"""Logs as MATLAB files: written in version 5, read in all, with structs and Simulink's objects."""
+"""Logs as named arrays: NumPy .npz, JSON, and MATLAB files with structs and Simulink objects."""
 
 from __future__ import annotations
 
