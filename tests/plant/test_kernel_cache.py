@@ -7,8 +7,8 @@ from pathlib import Path
 import numba
 import pytest
 
-from kemba.plant.kernel import jit
 from kemba.plant import simulate as loading
+from kemba.plant.kernel import jit
 
 
 def twice(x: float) -> float:
