@@ -11,7 +11,7 @@ from kemba.model.impact import felt
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
-from kemba.ocp.phases.radau import STATE
+from kemba.ocp.phases.radau import RADAU5, STATE
 from kemba.ocp.phases.settings import ModeConstraints
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
@@ -44,8 +44,8 @@ def _gaps(
     """Open gaps stay positive; where one closes it is zero, and a foot moves downwards.
 
     A gap is a curved function of the coordinates, so that with a rate of zero at the stages it
-    drifts by micrometres while it is closed. Where the task asks for a closed gap at the end, it is
-    zero there instead of at its last touch.
+    drifts by micrometres while it is closed. Where the task asks for a closed gap at the end, the
+    exact plan has it zero there instead of at its last touch.
     """
     c, phases = program.columns, program.phases
     settings = ModeConstraints.current()
@@ -66,7 +66,8 @@ def _gaps(
         low = settings.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
     zero = sorted(closing)
-    if asked and zero and closed[zero[-1] :].all() and not program.elastic:
+    exact = program.scheme is RADAU5 and not program.elastic
+    if exact and asked and zero and closed[zero[-1] :].all():
         zero[-1] = program.nodes
     touching = [(closing.get(node, len(phases) - 1), c.end(node)["q"]) for node in zero]
     rate = view.of(constraint.rate) / SPEED
