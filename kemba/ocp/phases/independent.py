@@ -19,49 +19,53 @@ class ContradictionError(ValueError):
 class Independent:
     """Equalities at one node, by their gradients with respect to (q, v, s) at a guess.
 
-    Dependent equalities would have no unique multipliers, so they are left out.
+    Dependent equalities would have no unique multipliers, so they are left out. Gradients are taken
+    at the velocities at which the equalities hold: at others a rate that follows from further ones
+    has a slope by the coordinates, and would pass for a condition on these.
     """
 
     def __init__(self, guess: dict[str, np.ndarray]) -> None:
         self.guess = np.concatenate([guess[x] for x in ("q", "v", "s")])
-        self.basis: list[np.ndarray] = []
+        self.velocities = slice(len(guess["q"]), len(guess["q"]) + len(guess["v"]))
         self.kept: list[ca.Function] = []
 
     def adds(self, g: ca.SX, view: View, what: str) -> bool:
         """Whether g = 0 (g is a scalar) is independent of the equalities so far; if so it joins
         them. Raises ContradictionError, which names `what` is asked, where these exclude it."""
-        equality = _with_slope(g, view)
-        row = self._rest(equality, self.guess, self.basis)
-        if row is None:
-            there = self._where_all_hold()
+        equality, there = _with_slope(g, view), self._where_all_hold()
+        if not self._leaves(equality, self._moving(there)):
             if abs(float(equality(there)[0])) <= AGREES:
                 return False
             # gradients may depend at one point alone: legs that stand right below their hips
-            basis: list[np.ndarray] = []
-            for kept in self.kept:
-                own = self._rest(kept, there, basis)
-                basis += [] if own is None else [own]
-            row = self._rest(equality, there, basis)
-        if row is None:
-            raise ContradictionError(f"the order of contacts and stops excludes {what}")
-        self.basis.append(row)
+            if not self._leaves(equality, there):
+                raise ContradictionError(f"the order of contacts and stops excludes {what}")
         self.kept.append(equality)
         return True
 
     def grants(self, g: ca.SX, view: View) -> bool:
         """Whether the equalities so far decide a scalar g."""
-        return self._rest(_with_slope(g, view), self.guess, self.basis) is None
+        return not self._leaves(_with_slope(g, view), self._moving(self._where_all_hold()))
 
-    def _rest(
-        self, equality: ca.Function, at: np.ndarray, basis: list[np.ndarray]
-    ) -> np.ndarray | None:
-        """The direction (n,) in which the gradient at a point (n,) leaves a basis; None if none."""
-        row = np.array(equality(at)[1]).ravel()
-        size = float(np.linalg.norm(row))
-        for b in basis:
-            row = row - (row @ b) * b
-        small, left = ModeConstraints.current().independent, float(np.linalg.norm(row))
-        return None if left <= small * max(size, small) else row / left
+    def _moving(self, there: np.ndarray) -> np.ndarray:
+        """The guess (n,) with the velocities of another point (n,)."""
+        point = self.guess.copy()
+        point[self.velocities] = there[self.velocities]
+        return point
+
+    def _leaves(self, equality: ca.Function, at: np.ndarray) -> bool:
+        """Whether the gradient at a point (n,) leaves the span of those of the equalities so
+        far."""
+        small, basis = ModeConstraints.current().independent, np.zeros((0, len(at)))
+        for one in (*self.kept, equality):
+            row = np.array(one(at)[1]).ravel()
+            size = float(np.linalg.norm(row))
+            for b in basis:
+                row = row - (row @ b) * b
+            left = float(np.linalg.norm(row))
+            independent = left > small * max(size, small)
+            if independent:
+                basis = np.vstack([basis, row / left])
+        return independent
 
     def _where_all_hold(self) -> np.ndarray:
         """The point (n,) near the guess at which all equalities so far hold."""

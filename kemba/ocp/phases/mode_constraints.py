@@ -11,7 +11,7 @@ from kemba.model.impact import felt
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
-from kemba.ocp.phases.radau import STATE
+from kemba.ocp.phases.radau import RADAU5, STATE
 from kemba.ocp.phases.settings import ModeConstraints
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
@@ -22,14 +22,14 @@ INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
 
 
-def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
+def add_mode_constraints(program: PhaseProgram, start: Independent, end: Independent) -> None:
     """Add the rows of every mode in every phase and at every impact.
 
-    `start`: the equalities that the task already asks for at the first node.
+    `start`, `end`: the equalities that the task already asks for at the first and the last node.
     """
     view = View(program)
     for i, constraint in enumerate(program.constraints):
-        _gaps(program, view, i, constraint)
+        _gaps(program, view, i, constraint, end)
         _held(program, view, i, constraint)
         _friction(program, view, i, constraint)
         _start(program, view, i, constraint, start)
@@ -38,24 +38,38 @@ def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
     _durations(program)
 
 
-def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
-    """Open gaps stay positive; where one closes it is zero, and a foot moves downwards."""
+def _gaps(
+    program: PhaseProgram, view: View, i: int, constraint: Constraint, end: Independent
+) -> None:
+    """Open gaps stay positive; where one closes it is zero, and a foot moves downwards.
+
+    A gap is a curved function of the coordinates, so that with a rate of zero at the stages it
+    drifts by micrometres while it is closed. Where the task asks for a closed gap at the end, the
+    exact plan has it zero there instead of at its last touch.
+    """
     c, phases = program.columns, program.phases
     settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
+    asked = end.grants(view.of(constraint.gap), view)
+    touched = {*closing, *([program.nodes] if asked else [])}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
     near = max(settings.away, round(settings.away_share * program.nodes))
-    away = np.convolve(closed, np.ones(2 * near + 1), "same") < 1  # of a closed element
+    around = np.append(closed, True)  # what the task asks of the end may close a gap there
+    away = np.convolve(around, np.ones(2 * near + 1), "same")[:-1] < 1  # of a closed element
     g = view.of(constraint.gap) / LENGTH
     for clear in (False, True):
         apart: Where = [
             (c.phase_of[e], stage["q"])
             for e in np.flatnonzero(~closed & (away == clear))
-            for stage in (c.stages[e][:-1] if e + 1 in closing else c.stages[e])
+            for stage in (c.stages[e][:-1] if e + 1 in touched else c.stages[e])
         ]
         low = settings.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
-    touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
+    zero = sorted(closing)
+    exact = program.scheme is RADAU5 and not program.elastic
+    if exact and asked and zero and closed[zero[-1] :].all():
+        zero[-1] = program.nodes
+    touching = [(closing.get(node, len(phases) - 1), c.end(node)["q"]) for node in zero]
     rate = view.of(constraint.rate) / SPEED
     hits = {n: (p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()}
     soft = program.task.landing.impact_speed
@@ -92,8 +106,10 @@ def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
         and p not in c.after
     ]  # fmt: skip
     sets = [(HELD, 0.0, 0.0), (AHEAD, 0.0, INF), (BACK, -INF, 0.0)]
+    settled = {tuple(z) for _, z in settling}
     for wanted, low, high in sets:
-        where = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
+        own = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
+        where = own if wanted == HELD else [(p, z) for p, z in own if tuple(z) not in settled]
         program.mode_constraint(i, "slip", view.z("q v"), slip, low, high, where)
     program.mode_constraint(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
 

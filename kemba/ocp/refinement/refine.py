@@ -285,10 +285,9 @@ class Refiner:
             x = carried(program, near.columns, near.scheme.points, own)
         first, end = program.columns.first, program.columns.end(program.nodes)
         at_first = Independent({g: x[first[g]] for g in STATE})
-        add_requirements(
-            program, self.requirements, at_first, Independent({g: x[end[g]] for g in STATE})
-        )
-        add_mode_constraints(program, at_first)
+        at_last = Independent({g: x[end[g]] for g in STATE})
+        add_requirements(program, self.requirements, at_first, at_last)
+        add_mode_constraints(program, at_first, at_last)
         x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
         return program, np.clip(x, program.lower, program.upper)
 
