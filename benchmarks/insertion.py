@@ -31,7 +31,7 @@ TASKS = (
     ("jump.yaml", "height=0.5 m", "model=hound"),
     *(("jump_forward.yaml", f"distance={d} m") for d in (0.2, 0.33, 0.5)),
     ("popup.yaml",),
-    (str(MOTIONS / "max_jump_land.yaml"),),
+    ("max_jump_land.yaml",),
 )
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "refine.md"
 BEGIN, END = "<!-- pulses: written by benchmarks/insertion.py -->", "<!-- end of pulses -->"

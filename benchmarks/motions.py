@@ -1,8 +1,8 @@
 """How far each motion is planned and certified: python benchmarks/motions.py [FILE.yaml ...]
 
-Without arguments the shipped `bound.yaml` and `popup.yaml`, and the tasks in benchmarks/motions,
-which are not solved whole yet. Everything from a guess (`--cold`). One row each: how far it came,
-cost, CPU seconds of the solves, and the sentence of `solve`.
+Without arguments the shipped motions beside the jumps, and the tasks in benchmarks/motions, which
+are not solved whole yet. Everything from a guess (`--cold`). One row each: how far it came, cost,
+CPU seconds of the solves, and the sentence of `solve`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from kemba.ocp import load_task
 from kemba.solve import Approach, Listener, best_plan
 
 HERE = Path(__file__).with_name("motions")
+SHIPPED = ("bound", "popup", "max_jump_land")
 
 
 def row(file: str) -> str:
@@ -47,7 +48,7 @@ def row(file: str) -> str:
 
 def main() -> None:
     """Print the table."""
-    shipped = [str(shipped_configs("tasks")[name]) for name in ("bound.yaml", "popup.yaml")]
+    shipped = [str(shipped_configs("tasks")[f"{name}.yaml"]) for name in SHIPPED]
     files = sys.argv[1:] or [*shipped, *map(str, sorted(HERE.glob("*.yaml")))]
     print("| motion | reached | torque² [N².m².s] | CPU [s] | sentence |\n|---|---|---|---|---|")
     for file in files:

@@ -45,3 +45,16 @@ def test_values_are_compared_where_the_others_hold() -> None:
     assert not found.adds(ca.sqrt(X**2 + Y**2) - 1.0, view(), "the radius")
     with pytest.raises(ContradictionError):
         found.adds(ca.sqrt(X**2 + Y**2) - 5.0, view(), "the radius of the guess")
+
+
+def test_a_rate_that_follows_from_others_is_no_condition_on_coordinates() -> None:
+    """A point on a circle that is at rest: the rate of its radius has a slope by its place while it
+    moves, and a third rate must not take the place of its height."""
+    u, v = ca.SX.sym("u"), ca.SX.sym("v")
+    moving: Any = SimpleNamespace(z=lambda groups: ca.vertcat(X, Y, u, v))
+    guess = {"q": np.array([0.6, 0.8]), "v": np.array([0.1, 0.2]), "s": np.zeros(0)}
+    found = Independent(guess)
+    rows = {"circle": X**2 + Y**2 - 1.0, "its rate": 2 * X * u + 2 * Y * v, "rest": u}
+    assert all(found.adds(row, moving, what) for what, row in rows.items())
+    assert not found.adds(v, moving, "rest in height")
+    assert found.adds(Y - 0.8, moving, "the height")

@@ -48,7 +48,7 @@ class Independent:
 
     def _moving(self, there: np.ndarray) -> np.ndarray:
         """The guess (n,) with the velocities of another point (n,)."""
-        point = self.guess.copy()
+        point: np.ndarray = self.guess.copy()
         point[self.velocities] = there[self.velocities]
         return point
 

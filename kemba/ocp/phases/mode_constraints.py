@@ -11,7 +11,7 @@ from kemba.model.impact import felt
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, Where
-from kemba.ocp.phases.radau import RADAU5, STATE
+from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
 from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
@@ -41,17 +41,12 @@ def add_mode_constraints(program: PhaseProgram, start: Independent, end: Indepen
 def _gaps(
     program: PhaseProgram, view: View, i: int, constraint: Constraint, end: Independent
 ) -> None:
-    """Open gaps stay positive; where one closes it is zero, and a foot moves downwards.
-
-    A gap is a curved function of the coordinates, so that with a rate of zero at the stages it
-    drifts by micrometres while it is closed. Where the task asks for a closed gap at the end, the
-    exact plan has it zero there instead of at its last touch.
-    """
+    """Open gaps stay positive; where one closes it is zero, and a foot moves downwards."""
     c, phases = program.columns, program.phases
     settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
-    asked = end.grants(view.of(constraint.gap), view)
-    touched = {*closing, *([program.nodes] if asked else [])}
+    asked = [program.nodes] if end.grants(view.of(constraint.gap), view) else []
+    touched = {*closing, *asked}  # there the gap is an equality
     closed = np.array([phases[p].active(i) for p in c.phase_of])
     near = max(settings.away, round(settings.away_share * program.nodes))
     around = np.append(closed, True)  # what the task asks of the end may close a gap there
@@ -65,11 +60,7 @@ def _gaps(
         ]
         low = settings.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
-    zero = sorted(closing)
-    exact = program.scheme is RADAU5 and not program.elastic
-    if exact and asked and zero and closed[zero[-1] :].all():
-        zero[-1] = program.nodes
-    touching = [(closing.get(node, len(phases) - 1), c.end(node)["q"]) for node in zero]
+    touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
     rate = view.of(constraint.rate) / SPEED
     hits = {n: (p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()}
     soft = program.task.landing.impact_speed
