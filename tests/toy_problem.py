@@ -6,7 +6,8 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
 
 EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 

@@ -8,27 +8,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.answer import ENDED, Answer, Ranked, phrase
-from kemba.identify.doubt.belief import believed, material
-from kemba.identify.doubt.cross_validation import one_part_shows
-from kemba.identify.doubt.formula import Formula, look
-from kemba.identify.doubt.held_out import HeldOut, error
-from kemba.identify.doubt.parsimony import Belief
-from kemba.identify.doubt.predictive import predictive, quoted
-from kemba.identify.doubt.run_consistency import drifting
-from kemba.identify.doubt.significance import best_gain, null_test
-from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
-from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.search import Search, SearchSettings
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.answer import ENDED, Answer, DiscoverSettings, Ranked, VerdictSettings, phrase
+from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
+from kemba.identify.infer.formula import Formula, look
+from kemba.identify.infer.joint import JointFit, joint_fit, told_by_figures
+from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
+from kemba.identify.infer.residual import drifting, rest_of
+from kemba.identify.infer.search import Search, SearchSettings
+from kemba.identify.infer.selection import Belief, believed, material, predictive, quoted
+from kemba.identify.infer.significance import NullTest, best_gain, null_test, smallest_detectable
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.structure import (
+    Rebuilt,
+    ahead,
+    is_mixture,
+    joined,
+    settled,
+    structure_row,
+)
+from kemba.identify.infer.verdict import Doubts, doubts_about, is_sure, verdict_on
+from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
-from kemba.identify.ranking import fitted_errors, ladder, ranked, values
-from kemba.identify.rest import rest_of
-from kemba.identify.settings import DiscoverSettings, VerdictSettings
-from kemba.identify.stages import is_mixture, joined, structure_row
-from kemba.identify.verdict import Doubts, doubts_about, is_sure, verdict_on
-from kemba.identify.written.joint import JointFit, joint_fit, told_by_figures
 
 WRITTEN = ("missing", "partly")  # verdicts that give a model
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from kemba.config import Document, beside
 from kemba.errors import KembaError
+from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
-from kemba.identify.written.adopt import write_model
 from kemba.learn import words
 from kemba.learn.aim import Aim, Aimed
 from kemba.learn.correction import Correction, correction_from, scatter_of, write_correction

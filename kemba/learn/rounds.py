@@ -12,7 +12,7 @@ import numpy as np
 from kemba.config import dump_yaml
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256
-from kemba.identify.written.adopt import reference
+from kemba.identify.adopt import reference
 from kemba.model import load_spec
 from kemba.ocp import Task
 from kemba.plant.execution.controller import read_controller

@@ -15,11 +15,11 @@ from mujoco_twin.sensors import Sensors
 from robot_logs import hop
 
 from kemba.effects.mechanics.boom_lever import BoomLever
+from kemba.identify.adopt import item
 from kemba.identify.discover import discover
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.written.adopt import item
 from kemba.mechanism import load_robot
 from kemba.model import load_model
 from kemba.model.spec import ModelSpec

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.identify.compare_logs import compare_logs
 from kemba.identify.logs.gate import BadData, check_logs
 from kemba.identify.logs.reading import read_log
+from kemba.identify.workflow import compare_logs
 from kemba.trajectory import Trajectory
 
 

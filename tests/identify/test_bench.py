@@ -13,16 +13,16 @@ import pytest
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.pneumatics.switching import delayed, is_on, pulses
+from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.prediction import absolute_pressure
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.bench.rig_model import RigModel
-from kemba.identify.design.settings import DesignSearchSettings, ExperimentSettings
-from kemba.identify.evidence.linear import Linear, estimate, names_of, priors
-from kemba.identify.experiment import propose
+from kemba.identify.design.rig import propose
+from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings
+from kemba.identify.infer.linear import Linear, estimate, names_of, priors
 from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs
-from kemba.identify.written.adopt import adopt_effect
 from kemba.model.spec import load_model, load_spec
 from kemba.plant import Profile
 from kemba.plant.rig.imposed import drive, hermite

@@ -12,10 +12,10 @@ from kemba.identify.compare.bins import (
     correlation_length,
     excess,
 )
-from kemba.identify.compare.tolerance import Slopes, within_tolerance
-from kemba.identify.evidence.bootstrap import NullTest
-from kemba.identify.evidence.windows import Windows, changes, rms
-from kemba.identify.problem.problem import Rows
+from kemba.identify.compare.hints import Slopes, within_tolerance
+from kemba.identify.infer.significance import NullTest
+from kemba.identify.infer.windows import Windows, changes, rms
+from kemba.identify.problem.types import Rows
 
 
 def binned(errors: list[np.ndarray]) -> list[ConditionBin]:

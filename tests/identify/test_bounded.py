@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.doubt.cross_validation import within_tolerance
-from kemba.identify.evidence.bounded import within_bounds
-from kemba.identify.evidence.search import Search
-from kemba.identify.ranking import values
+from kemba.identify.infer.cross_validation import within_tolerance
+from kemba.identify.infer.null_model import within_bounds
+from kemba.identify.infer.ranking import values
+from kemba.identify.infer.search import Search
 
 BOTH = ("bend", "drag")  # both follow the same speed: what one lacks the other takes
 

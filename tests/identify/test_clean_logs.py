@@ -17,10 +17,9 @@ from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.clocks import ClockSettings, looked_at
 from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.compare_logs import compare_logs
 from kemba.identify.logs.limits import limits_of
-from kemba.identify.problem.quantisation import step_of, telling
-from kemba.identify.workflow import discover_logs
+from kemba.identify.problem.noise import step_of, telling
+from kemba.identify.workflow import compare_logs, discover_logs
 from kemba.model.spec import load_model
 from kemba.trajectory import Array, Trajectory
 

@@ -14,9 +14,9 @@ pytest.importorskip("numba")
 
 from twin import bench, cases, catalogue, figures, measure, rigs
 
-from kemba.identify.bench.missing import lagged
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.compare.compare import Comparison, compare
+from kemba.identify.problem.missing_force import lagged
 from kemba.model.spec import load_model
 from kemba.plotting.study.comparison import plot_comparison
 from kemba.trajectory import Trajectory

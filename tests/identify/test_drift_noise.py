@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from kemba.identify.problem.drift import DriftNoise
-from kemba.identify.problem.noise import colours, whitened
+from kemba.identify.problem.noise import DriftNoise, colours, whitened
 from kemba.identify.problem.types import Rows
 
 TIME = np.arange(2000) / 1e3

@@ -12,12 +12,11 @@ from twin.cases import bench_case
 from twin.measure import Sensors
 
 from kemba.identify.bench.problem import bench_problem
-from kemba.identify.doubt.drifts import drift_columns
-from kemba.identify.doubt.formula import Formula, look
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL
+from kemba.identify.infer.formula import Formula, drift_columns, look
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.spike_slab import NULL
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.problem.drift import DriftColumnSettings
+from kemba.identify.problem.noise import DriftColumnSettings
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 

@@ -12,14 +12,8 @@ from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 from typer.testing import CliRunner
 
 from kemba.errors import KembaError
-from kemba.identify.design.rig import design_rig_test
-from kemba.identify.design.rivals import contenders
-from kemba.identify.design.settings import (
-    DesignSearchSettings,
-    ExperimentSettings,
-    RigCourseSettings,
-)
-from kemba.identify.experiment import propose
+from kemba.identify.design.rig import RigCourseSettings, design_rig_test, propose
+from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings, contenders
 from kemba.model.spec import load_model
 from kemba.plant.rig.bench import load_rig
 from kemba_cli.main import app

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.identify.evidence.linear import Linear
-from kemba.identify.evidence.spike_slab import NULL, Ranker
-from kemba.identify.problem.problem import Candidate, Parameter
+from kemba.identify.infer.linear import Linear
+from kemba.identify.infer.spike_slab import NULL, Ranker
+from kemba.identify.problem.types import Candidate, Parameter
 
 SUPPLY = Candidate("supply", Parameter("k", size=0.1))
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from kemba.effects.pneumatics.supply_line import SupplyLine
-from kemba.identify.evidence.figures import settled
-from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.infer.null_model import Baseline
+from kemba.identify.infer.structure import settled
+from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.candidates import by_default
-from kemba.identify.problem.line import LINE, line_candidates
 from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.structure import LINE, line_candidates
 from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
 from kemba.model import Model, load_model
 

@@ -9,11 +9,11 @@ import pytest
 from scipy.signal import lfilter
 from toy_problem import Toy
 
-from kemba.identify.doubt import formula
-from kemba.identify.doubt.formula import by_chance, look
-from kemba.identify.evidence.bootstrap import BootstrapSettings, NullTest
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL
+from kemba.identify.infer import formula
+from kemba.identify.infer.formula import by_chance, look
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.significance import BootstrapSettings, NullTest
+from kemba.identify.infer.spike_slab import NULL
 
 
 @pytest.mark.parametrize("width", [0.3, 1.0, 10.0])

@@ -10,13 +10,12 @@ pytest.importorskip("numba")
 
 from full_plant import answered, plant_log, written
 
-from kemba.identify.compare_logs import compare_logs
-from kemba.identify.evidence.figures import settled
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.windows import error_ratio
-from kemba.identify.problem.line import LINE
-from kemba.identify.problem.structure import ORIFICE
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.structure import settled
+from kemba.identify.infer.windows import error_ratio
+from kemba.identify.problem.structure import LINE, ORIFICE
 from kemba.identify.robot.problem import robot_problem
+from kemba.identify.workflow import compare_logs
 from kemba.model import load_model
 
 LIKELY = (LINE, "seal_friction", "supply_droop", "both_mode_loss", "payload")

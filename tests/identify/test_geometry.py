@@ -13,10 +13,10 @@ from robot_logs import hops
 from twin.catalogue import hidden
 
 from kemba.effects.mechanics.geometry import Geometry
+from kemba.identify.adopt import item
 from kemba.identify.discover import discover
 from kemba.identify.logs.gate import BadData
 from kemba.identify.robot.problem import RobotProblem, robot_problem
-from kemba.identify.written.adopt import item
 from kemba.mechanism import robot_mechanism
 from kemba.model import Model, load_model
 from kemba.model.spec import ModelSpec

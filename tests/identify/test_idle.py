@@ -13,11 +13,11 @@ from kemba.effects import BY_KIND
 from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
-from kemba.identify.doubt.cross_validation import figures_off, window_gain
-from kemba.identify.doubt.parsimony import Belief, is_idle
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL
-from kemba.identify.verdict import doubts_about, verdict_on
+from kemba.identify.infer.cross_validation import figures_off, window_gain
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import Belief, is_idle
+from kemba.identify.infer.spike_slab import NULL
+from kemba.identify.infer.verdict import doubts_about, verdict_on
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 

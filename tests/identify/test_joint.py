@@ -11,14 +11,12 @@ from toy_problem import Toy
 from kemba.config import load_yaml
 from kemba.errors import KembaError
 from kemba.files import write_json
+from kemba.identify.adopt import adopt_answer, adopted
 from kemba.identify.discover import discover
-from kemba.identify.doubt.held_out import HeldOut
-from kemba.identify.doubt.parsimony import Belief
-from kemba.identify.doubt.predictive import quoted
-from kemba.identify.evidence.search import Search
-from kemba.identify.written.adopt import adopt_answer, adopted
-from kemba.identify.written.joint import joint_fit
-from kemba.identify.written.scatter import apart_between_runs
+from kemba.identify.infer.cross_validation import HeldOut
+from kemba.identify.infer.joint import apart_between_runs, joint_fit
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import Belief, quoted
 from kemba.model import load_spec, read_covariance
 
 BOTH = ("kick", "wave")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.identify.evidence.left_out_noise import LeftOutNoiseSettings, left_out_noise
-from kemba.identify.problem.problem import Array, Labels
+from kemba.identify.infer.significance import LeftOutNoiseSettings, left_out_noise
+from kemba.identify.problem.types import Array, Labels
 
 BLOCKS, ROWS, EFFECTS = 24, 50, 12
 LABELS = np.repeat(np.arange(BLOCKS), ROWS)

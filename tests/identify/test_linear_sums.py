@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.identify.evidence.linear import condense, moved
-from kemba.identify.evidence.windows import Windows
+from kemba.identify.infer.linear import condense, moved
+from kemba.identify.infer.windows import Windows
 
 
 def test_sums_about_another_point_are_those_made_there() -> None:

@@ -14,11 +14,8 @@ from twin.scripts import from_table
 
 from kemba.config import Document
 from kemba.errors import KembaError
-from kemba.identify.design.motion_proposal import propose_motion
-from kemba.identify.design.motions import Sway, controller, task
-from kemba.identify.design.rivals import Rivals
-from kemba.identify.design.robot import safe
-from kemba.identify.design.settings import SwaySettings
+from kemba.identify.design.robot import Sway, SwaySettings, controller, propose_motion, safe, task
+from kemba.identify.design.separation import Rivals
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.spec import load_model

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.identify.evidence.linear import Linear
-from kemba.identify.evidence.spike_slab import Ranker
+from kemba.identify.infer.linear import Linear
+from kemba.identify.infer.spike_slab import Ranker
 from kemba.identify.problem.types import Candidate, Parameter
 
 

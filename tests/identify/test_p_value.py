@@ -15,11 +15,9 @@ from scipy.stats import kstest
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.doubt.belief import believed
-from kemba.identify.doubt.parsimony import Belief
-from kemba.identify.doubt.significance import best_gain
-from kemba.identify.evidence.bootstrap import NullTest
-from kemba.identify.evidence.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.selection import Belief, believed
+from kemba.identify.infer.significance import NullTest, best_gain
+from kemba.identify.infer.spike_slab import SpikeSlabSettings
 
 MACHINES = 200
 SIZE = 10.0  # N; the size of every effect of the toy

@@ -7,13 +7,12 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.doubt.belief import believed
-from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
-from kemba.identify.doubt.parsimony import Belief, likeliest_part, overclaimed, simplest
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.ranking import equivalents
-from kemba.identify.verdict import doubts_about, verdict_on
+from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.infer.ranking import equivalents
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import Belief, believed, likeliest_part, overclaimed, simplest
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.verdict import doubts_about, verdict_on
 
 
 def windowed(truth: dict[str, float], seed: int = 0, artefact: float = 0.0) -> Toy:
@@ -80,7 +79,7 @@ def test_a_larger_answer_must_gain_in_left_out_rows_but_not_only_there(
     rows: float, too_much: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its windows gain 0 nats, with a standard error of 2.3."""
-    doubt = "kemba.identify.doubt.parsimony"
+    doubt = "kemba.identify.infer.selection"
     monkeypatch.setattr(f"{doubt}.left_out", lambda *of: Gain(rows, abs(rows)))
     monkeypatch.setattr(f"{doubt}.window_gain", lambda *of: Gain(0.0, 2.3))
     search = Search(windowed({"kick.a": 9.0}))
@@ -88,7 +87,7 @@ def test_a_larger_answer_must_gain_in_left_out_rows_but_not_only_there(
 
 
 def test_parts_that_were_refitted_on_the_way_up_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kemba.identify.doubt.parsimony._thin", lambda search, best: None)
+    monkeypatch.setattr("kemba.identify.infer.selection._thin", lambda search, best: None)
     many = ("bend", "hum", "kick", "wave")
     search = searched(windowed({"kick.a": 9.0}), "kick", "bend", "hum", "wave")
     assert simplest(search, Belief(many, 0.01)).best == ("kick",)
@@ -116,7 +115,7 @@ def test_effects_that_do_not_pay_leave_an_answer_one_by_one(
     search = Search(windowed({"kick.a": 9.0, "hum.a": 3.0, "wave.a": 3.0}))
     search.start()
     search.visit(many)
-    monkeypatch.setattr("kemba.identify.doubt.belief.left_out", alone_pays)
+    monkeypatch.setattr("kemba.identify.infer.selection.left_out", alone_pays)
     assert believed(search, many, p_value=0.0).best == ("kick",)
 
 

@@ -9,13 +9,9 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.doubt.cross_validation import (
-    CrossValidationSettings,
-    gained,
-    window_powers,
-)
-from kemba.identify.doubt.parsimony import is_idle
-from kemba.identify.evidence.search import Search
+from kemba.identify.infer.cross_validation import CrossValidationSettings, gained, window_powers
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import is_idle
 
 
 def test_parts_that_gain_alike_have_the_usual_standard_error() -> None:

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kemba.identify import rest, verdict
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.doubt.parsimony import Belief
+from kemba.identify.infer import residual as rest
+from kemba.identify.infer import verdict
+from kemba.identify.infer.selection import Belief
 
 
 def left(monkeypatch: pytest.MonkeyPatch, gain: float, force: float, error: float = 1.2) -> str:

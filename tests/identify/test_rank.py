@@ -10,13 +10,12 @@ from toy_problem import Toy
 
 from kemba.identify.answer import ENDED, Answer, Ranked, Value, phrase
 from kemba.identify.discover import discover
-from kemba.identify.doubt.belief import material
-from kemba.identify.doubt.cross_validation import Gain, left_out, left_out_error
-from kemba.identify.doubt.parsimony import Belief
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL, SpikeSlabSettings, probabilities
-from kemba.identify.ranking import values
-from kemba.identify.verdict import doubts_about, verdict_on
+from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.infer.ranking import values
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import Belief, material
+from kemba.identify.infer.spike_slab import NULL, SpikeSlabSettings, probabilities
+from kemba.identify.infer.verdict import doubts_about, verdict_on
 from kemba.plotting.study.discovery import plot_steps
 
 

@@ -7,15 +7,8 @@ from collections.abc import Collection
 import numpy as np
 import pytest
 
-from kemba.identify.problem.problem import (
-    Array,
-    Candidate,
-    Parameter,
-    Problem,
-    Rows,
-    Theta,
-)
-from kemba.identify.problem.slopes import mean_slope
+from kemba.identify.problem.problem import Problem, mean_slope
+from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
 
 ROW = 1e-3  # s
 EDGES = (0.0505, 0.1205, 0.3105)  # s, between two rows

@@ -13,13 +13,13 @@ from robot_logs import hop, hops
 from twin import figures, measure, run
 
 from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer, Ranked, Value
 from kemba.identify.discover import discover
+from kemba.identify.infer.structure import is_mixture, joined
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.structure import ORIFICE, structure_candidates
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.stages import is_mixture, joined
-from kemba.identify.written.adopt import write_model
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
 from kemba.trajectory import Trajectory

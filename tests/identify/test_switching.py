@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kemba.effects.pneumatics.switching import changes, delayed, instants, is_on, pulses
-from kemba.identify.robot.dynamics.air import substeps
-from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.identify.robot.air import substeps
+from kemba.identify.robot.batch import ResampledLog
 from kemba.plant import Profile
 from kemba.plant.simulation.valves import acting
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from kemba.identify.tails import chi2_above, false_discoveries, normal_above, normal_at
+from kemba.identify.compare.bins import chi2_above, false_discoveries, normal_above, normal_at
 
 
 def test_tails_are_those_of_scipy() -> None:

@@ -14,10 +14,9 @@ from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
 from kemba.identify.logs.excerpt import held
 from kemba.identify.logs.limits import LimitSettings
-from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.problem.problem import Array, Flags
-from kemba.identify.problem.quantisation import telling
+from kemba.identify.problem.noise import difference_sigma, telling
 from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")

@@ -15,10 +15,11 @@ from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.evidence.colour import best_fit
-from kemba.identify.evidence.linear import Linear, condense, names_of, priors
-from kemba.identify.logs.settings import GateSettings
-from kemba.identify.problem.problem import Problem, Theta
+from kemba.identify.infer.colour import best_fit
+from kemba.identify.infer.linear import Linear, condense, names_of, priors
+from kemba.identify.logs.reading import GateSettings
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Theta
 from kemba.trajectory import Trajectory
 
 COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta

@@ -13,16 +13,16 @@ from typing_extensions import Self
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
 from kemba.identify.bench.bench_log import BenchLog, prepare
-from kemba.identify.bench.beyond import formula_columns, leftover
-from kemba.identify.bench.missing import bench_missing
-from kemba.identify.bench.operating_point import (
+from kemba.identify.bench.forces import (
     bench_force_channel,
+    bench_missing,
     bench_operating_point,
+    formula_columns,
+    leftover,
     switchings,
 )
-from kemba.identify.bench.predicted import PredictedLogs, settle_starts
-from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor
-from kemba.identify.bench.quiet import position_noise
+from kemba.identify.bench.motion import position_noise
+from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, PredictedLogs, settle_starts
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates

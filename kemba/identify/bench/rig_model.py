@@ -13,7 +13,7 @@ import numpy as np
 from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.effects.series import Series
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.types import Array
 from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.node import Node

@@ -10,7 +10,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.types import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 

@@ -1,20 +1,57 @@
-"""Errors by condition: channel, phase of motion, valve mode and region of the piston's stroke."""
+"""Tails of distributions, and the control of false discoveries, by `scipy.special` alone.
+
+They are those of `scipy.stats`, whose import takes half a second of every comparison.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc, ndtr, ndtri
 
-from kemba.identify.evidence.windows import codes, rms
-from kemba.identify.problem.problem import Array, Labels, Rows, Texts
-from kemba.identify.tails import chi2_above, false_discoveries
+from kemba.identify.infer.windows import codes, rms
+from kemba.identify.problem.types import Array, Labels, Rows, Texts
+
+
+def chi2_above(value: float, degrees: float) -> float:
+    """The chance that chi-squared with these degrees of freedom is larger."""
+    return float(chdtrc(degrees, value))
+
+
+def normal_above(value: Array) -> Array:
+    """The chances (n,) that a standard normal is larger than `value` (n,)."""
+    return np.asarray(ndtr(-np.asarray(value)))
+
+
+def normal_at(chance: float) -> float:
+    """The value that a standard normal exceeds with this chance."""
+    return float(-ndtri(chance))
+
+
+def false_discoveries(chances: Sequence[float] | Array) -> Array:
+    """Adjusted chances (n,): the expected share of false ones among those found up to each.
+
+    Source: Benjamini and Hochberg 1995.
+    """
+    p = np.asarray(chances, dtype=float)
+    order = np.argsort(p)
+    raised = p[order] * (len(p) / np.arange(1, len(p) + 1))
+    least = np.minimum.accumulate(raised[::-1])[::-1]
+    found = np.empty(len(p))
+    found[order] = np.clip(least, 0.0, 1.0)
+    return found
+
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
+
+
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
+
+
 # phases of motion and open valves (extend, retract) in words, in the order in which they are shown
 PHASES = {
     "rest": "at rest",
@@ -24,6 +61,8 @@ PHASES = {
     "flight": "in the air",
     "moving": "moving",
 }
+
+
 MODES = {"00": "closed", "10": "extend", "01": "retract", "11": "both"}
 
 

@@ -11,12 +11,21 @@ import numpy as np
 
 from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
-from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
-from kemba.identify.compare.missing_force import Peak, peaks
-from kemba.identify.compare.tolerance import Tolerant, slopes, within_tolerance
+from kemba.identify.compare.hints import (
+    Hint,
+    Response,
+    Tolerant,
+    conflicts,
+    lacking,
+    lagged,
+    slopes,
+    within_tolerance,
+)
 from kemba.identify.compare.words import place_of
-from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
-from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
+from kemba.identify.infer.windows import Windows, aggregation_windows, free_starts, rms
+from kemba.identify.problem.missing_force import Peak, peaks
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, MissingForce, Rows, Texts, Theta
 from kemba.units import short
 
 

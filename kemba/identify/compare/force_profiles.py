@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array, Flags, ForceChannel, Problem
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Flags, ForceChannel
 from kemba.units import short
 
 

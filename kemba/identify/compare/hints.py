@@ -1,5 +1,4 @@
-"""What the error goes with: a force by speed, position or load, commands sent before it, and
-parameters that would have to differ between runs or between valve modes."""
+"""How much of an error the model's figures could explain if they were off by their tolerance."""
 
 from __future__ import annotations
 
@@ -8,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kemba.identify.compare.bins import chi2_above, false_discoveries, normal_above, normal_at
 from kemba.identify.compare.force_profiles import (
     ForceProfile,
     ForceProfileSettings,
@@ -15,12 +15,62 @@ from kemba.identify.compare.force_profiles import (
     middle,
     risen,
 )
-from kemba.identify.compare.tolerance import Slopes
 from kemba.identify.compare.words import command, quantity
-from kemba.identify.evidence.spike_slab import SpikeSlabSettings
-from kemba.identify.evidence.windows import codes
-from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
-from kemba.identify.tails import chi2_above, normal_at
+from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.windows import codes
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Candidate, Changes, Labels, Rows, Theta
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes of a residual.
+
+    `by_lead` (n, leads): along the switch of every effect, per size. `by_nuisance` (n, nuisance):
+    along every nuisance parameter, per prior sigma.
+    """
+
+    leads: tuple[Candidate, ...]
+    by_lead: Array
+    by_nuisance: Array
+
+
+def slopes(problem: Problem, at: Theta) -> Slopes:
+    """Slopes at theta `at`, of all effects but sensor faults."""
+    leads = tuple(c for c in problem.candidates.values() if not c.sensor)
+    nuisance = list(problem.nuisance)
+    jacobian = problem.jacobian(at, [*(c.key for c in leads), *nuisance])
+    jacobian = jacobian * (
+        [c.lead.size for c in leads] + [problem.nuisance[n][1] for n in nuisance]
+    )
+    return Slopes(leads, jacobian[:, : len(leads)], jacobian[:, len(leads) :])
+
+
+@dataclass(frozen=True)
+class Tolerant:
+    """What is left when the model is as good as models are.
+
+    `left` (n,): the residual. `q_value`: of the figure or absent effect that is farthest off; it
+    controls false discoveries over all of them.
+    """
+
+    left: Array
+    q_value: float
+
+
+def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
+    """The likeliest explanation of a residual (n,) by a model that lacks nothing.
+
+    Each nuisance parameter is off by about its prior sigma, and each absent effect is there with a
+    small share of its size, as under every hypothesis of `discover`. The likeliest values, in units
+    of these sigmas, are then no larger than standard normal numbers are.
+    """
+    spike = SpikeSlabSettings.spike
+    columns = np.hstack([spike * known.by_lead, known.by_nuisance])
+    h = columns.T @ columns + np.eye(columns.shape[1])
+    off = -np.linalg.solve(h, columns.T @ residual)
+    q = false_discoveries(2.0 * normal_above(np.abs(off))) if len(off) else np.ones(1)
+    return Tolerant(residual + columns @ off, float(q.min()))
 
 
 class HintSettings:

@@ -1,10 +1,10 @@
-"""Logs that tests of a rig would give, without the rig: only their motion and commands matter."""
+"""Logs that tests of a rig would give, without the rig, and the standard tests judged by them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -12,11 +12,11 @@ from scipy.signal import lfilter
 
 from kemba.identify.bench.bench_log import BenchLog, prepare
 from kemba.identify.bench.problem import BenchProblem
-from kemba.identify.design.settings import ExperimentSettings
+from kemba.identify.design.separation import ExperimentSettings, Rivals, Separation, separation
 from kemba.identify.problem.noise import Colour, learn
-from kemba.identify.problem.problem import Theta
+from kemba.identify.problem.types import Theta
 from kemba.model.model import Model
-from kemba.plant.rig.rigs import Rig, Test
+from kemba.plant.rig.rigs import DynamometerRig, LockedRig, RandomRig, Rig, Test
 from kemba.trajectory import Trajectory
 
 
@@ -98,3 +98,46 @@ def _colour(rows: float) -> Colour:
     slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(settings.sample))
     share = settings.unexplained / settings.force_noise
     return learn(rng.standard_normal(settings.sample) + share * slow)
+
+
+@dataclass(frozen=True)
+class JudgedRig:
+    """A rig, the evidence that its tests are expected to give, and the seconds of its logs."""
+
+    rig: Rig
+    evidence: Separation
+    log_s: float
+
+    @property
+    def pace(self) -> float:
+        """Expected evidence [nats] per second of log."""
+        return self.evidence.least / self.log_s
+
+
+def menu(stroke: float) -> list[Rig]:
+    """Standard tests of one piston of this stroke [m]."""
+    modes = ("extend", "retract", "both", "none")
+    slow = DynamometerRig.model_validate(
+        {"name": "slow_stroke", "speeds": {m: [0.02, 0.05] for m in modes}}
+    )
+    fast = DynamometerRig.model_validate(
+        {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
+    )
+    both_ends = {"positions": [0.0, stroke / 2, stroke]}
+    return [
+        LockedRig.model_validate({"name": "locked_extend", "chamber": "extend", **both_ends}),
+        LockedRig.model_validate({"name": "locked_retract", "chamber": "retract", **both_ends}),
+        slow,
+        fast,
+        RandomRig.model_validate({"name": "random", "duration": 4.0}),
+        RandomRig.model_validate({"name": "random_fast", "duration": 4.0, "speed": 1.2}),
+    ]
+
+
+def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedRig]:
+    """Every standard test; none where a rig cannot show two of the rivals."""
+    for rig in menu(bench.stroke):
+        found = separation(bench.problem(rig), rivals)
+        if found is None:
+            return
+        yield JudgedRig(rig, found, log_time(rig, bench.stroke))

@@ -1,4 +1,7 @@
-"""What may be missing: effects of the catalogue that a model could have, and sensor faults."""
+"""Nominal figures that every fit leaves free: what a machine has a little different from its model.
+
+Which they are and by how much is declared by the effect or the mechanism whose figures they are.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,47 @@ from collections.abc import Iterable, Mapping
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
-from kemba.identify.problem.line import LINE, LineResistance
-from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
-from kemba.identify.problem.structure import ORIFICE, OrificeShare
+from kemba.identify.problem.structure import LINE, ORIFICE, LineResistance, OrificeShare
+from kemba.identify.problem.types import Candidate, Parameter, Theta
 from kemba.model.evaluation import port_name
 from kemba.model.model import Model
 from kemba.quantity import Param
+
+LINK = "tolerance."  # how names of a link's figures begin
+
+
+def nominal_figures(model: Model, except_for: Iterable[str] = ()) -> dict[str, tuple[float, float]]:
+    """Factor 1 and its 1 sigma by figure, named as `Model.build(scaled=...)` takes them.
+
+    `except_for`: parameters that are free anyway; the figures of their effects are left out.
+    """
+    free = {name.rsplit(".", 1)[0] for name in except_for}
+    return {
+        f"{effect.name}.{figure}": (1.0, share)
+        for effect in model.effects
+        if effect.name not in free
+        for figure, share in effect.tolerances().items()
+    }
+
+
+def link_figures(model: Model) -> dict[str, tuple[float, float]]:
+    """Share 0 by which a link's figure is off, and its 1 sigma, by name; {} for a rig."""
+    found = model.mechanism.tolerances
+    return {f"{LINK}{name}": (0.0, share) for name, share in found.items()}
+
+
+def leg_by_leg(model: Model) -> Model:
+    """The same model with every effect that has nominal figures of its own once per leg: the parts
+    of one leg differ from those of another."""
+    effects: list[Effect] = []
+    for effect in model.effects:
+        if effect.nominal and effect.place == "leg" and effect.leg is None:
+            effects += [effect.bind({"on": leg}) for leg in model.mechanism.legs]
+        else:
+            effects.append(effect)
+    return Model(model.mechanism, effects, model.supply, model.name)
+
 
 SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}
 

@@ -1,4 +1,9 @@
-"""Coloured noise: a short autoregression, learnt on what a flexible model leaves over."""
+"""Noise of a channel: its steps, its white part, its slow drift, and its colour.
+
+A drift of one sigma moves a reading no further than its noise, but for a second instead of a row,
+and so it looks like a small force, or like a faulty sensor. Colour is a short autoregression,
+learnt on what a flexible model leaves over.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +15,123 @@ import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-from kemba.identify.problem.drift import DriftNoise, drift_waves
-from kemba.identify.problem.problem import Array, Rows
-from kemba.identify.problem.quantisation import step_of
+from kemba.identify.problem.sensor_noise import ColourSettings
+from kemba.identify.problem.types import Array, Flags, Labels, Rows
+
+
+class QuantisationSettings:
+    """How the step of a sensor is found."""
+
+    # readings closer than this share of their range are one reading: conversion of units rounds in
+    # the fifteenth digit, files have six or more
+    same = 1e-6
+    # readings come in steps where most differences of neighbours are whole steps: of what moves
+    # without a rest, the smallest difference is its slowest motion
+    near = 0.15  # distance from a whole number of steps that rounding in a file makes
+    few = 5.5  # differences of more steps tell nothing, since the error of the step adds up
+    most = 0.6  # share of differences that are whole steps; by chance 0.3 are
+    # steps of so many sigmas of the noise are coarse: below it, noise makes rounding errors
+    # independent (Widrow and Kollar 2008)
+    coarse = 2.0
+    longest = 1000  # rows at rest that count as one reading; of a longer rest more count
+
+
+def step_of(values: Array) -> float:
+    """The step in which a channel (n,) is read, in its unit; 0 where it has none."""
+    known = np.unique(values[np.isfinite(values)])
+    steps = np.diff(known)
+    if not len(steps):
+        return 0.0
+    steps = steps[steps > QuantisationSettings.same * np.ptp(known)]
+    counts = steps / steps.min()
+    counts = counts[counts < QuantisationSettings.few]
+    whole = np.abs(counts - np.round(counts)) < QuantisationSettings.near
+    return float(steps.min()) if np.mean(whole) > QuantisationSettings.most else 0.0
+
+
+def is_coarse(step: float, sigma: float) -> bool:
+    """Whether a sensor's step is so much larger than its noise that rounding errors depend on each
+    other."""
+    return step > QuantisationSettings.coarse * sigma
+
+
+def telling(values: Array, sigma: float) -> Flags:
+    """Rows (n,) that tell something of their own: of readings that stand still, the middle one.
+
+    Readings stand still where they keep to one step, or change to and fro between two. They have
+    one rounding error in common, so that many of them tell no more than one. Where the noise
+    `sigma` is as large as the steps, each reading is rounded by itself and all rows count.
+    """
+    step = step_of(values)
+    if not is_coarse(step, sigma):
+        return np.ones(len(values), dtype=bool)
+    chosen = np.zeros(len(values), dtype=bool)
+    known = np.flatnonzero(np.isfinite(values))
+    level = np.round(values[known] / step).astype(int)
+    first = 0
+    while first < len(level):
+        last = first + _still(level[first:])
+        chosen[known[(first + last - 1) // 2]] = True
+        first = last
+    return chosen
+
+
+def _still(level: Labels) -> int:
+    """How many of the first readings (n,), counted in steps, keep to one level or to two."""
+    level = level[: QuantisationSettings.longest]
+    low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
+    moved = high - low > 1
+    return int(np.argmax(moved)) if moved.any() else len(moved)
+
+
+class DriftColumnSettings:
+    """Drifts that any sensor may have."""
+
+    waves = 8  # cosines of a run: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s
+    size = 1.0  # sigma of a drift, in stated sigmas: as the noise
+
+
+def drift_waves(time: Array) -> tuple[Array, Array]:
+    """Cosines (n, d) of a run's rows at `time` (n,) [s], and the standard deviations (d,) that make
+    a drift of them."""
+    length = max(float(np.ptp(time)), 1e-9)
+    order = np.arange(float(DriftColumnSettings.waves))
+    return np.cos(np.pi * np.outer((time - time[0]) / length, order)), _sigmas(order, length)
+
+
+def _sigmas(order: Array, length: float) -> Array:
+    """Standard deviations (d,) of cosines that make a lag of unit variance, over `length` [s]."""
+    memory = max(ColourSettings.drifts)
+    variance = np.where(order == 0, 0.5, 1.0) / (1.0 + (np.pi * order * memory / length) ** 2)
+    mean = variance @ np.where(order == 0, 1.0, 0.5)
+    return np.asarray(DriftColumnSettings.size * np.sqrt(variance / mean))
+
+
+@dataclass(frozen=True)
+class DriftNoise:
+    """A drift whose size is not known, in white rows: they have the covariance I + UU'.
+
+    `shape` (n, d): orthonormal; `variance` (d,): of the drift along it.
+    """
+
+    shape: Array
+    variance: Array
+
+    @classmethod
+    def of(cls, columns: Array) -> DriftNoise:
+        """Of columns U (n, d), one per cosine of unit sigma, whitened."""
+        shape, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return cls(shape, size**2)
+
+    def out_of(self, rows: Array) -> Array:
+        """(I + UU')^-1/2 rows, of (n,) or (n, k): white again."""
+        lost = 1.0 - 1.0 / np.sqrt(1.0 + self.variance)
+        return np.asarray(rows - (self.shape * lost) @ (self.shape.T @ rows))
+
+    @property
+    def log_density(self) -> float:
+        """What the drift adds to the log density [nats] of rows that are zero."""
+        return -0.5 * float(np.sum(np.log1p(self.variance)))
 
 
 class NoiseSettings:

@@ -1,8 +1,4 @@
-"""The contract between logs and search: a set of logs under one model, as whitened residuals.
-
-A bench log and a robot log differ in everything but this contract. A subclass of `Problem` owns
-the prediction and the noise. Ranking, search, doubts and the answer work on any `Problem`.
-"""
+"""Residuals where little can be predicted, and their finite differences."""
 
 from __future__ import annotations
 
@@ -15,40 +11,44 @@ from types import MappingProxyType
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.problem.slopes import StepSettings
 from kemba.identify.problem.types import (
     Array,
     Candidate,
     Changes,
     Flags,
     ForceChannel,
-    Labels,
     Leftover,
     MissingForce,
     OperatingPoint,
     Parameter,
     Rows,
-    Texts,
     Theta,
 )
 from kemba.model.model import Model
 
-__all__ = [
-    "Array",
-    "Candidate",
-    "Changes",
-    "Flags",
-    "ForceChannel",
-    "Labels",
-    "Leftover",
-    "MissingForce",
-    "OperatingPoint",
-    "Parameter",
-    "Problem",
-    "Rows",
-    "Texts",
-    "Theta",
-]
+
+class StepSettings:
+    """Steps of finite differences."""
+
+    nuisance = 0.5  # step of a nominal figure, in prior sigmas
+    parameter = 0.05  # step of a parameter that is on, as a share of its size or value
+    absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
+
+
+def bounded(residual: Array, absurd: float) -> Array:
+    """Residuals held within `absurd` sigmas; those that are no numbers are as large as that."""
+    return np.asarray(np.clip(np.nan_to_num(residual, nan=absurd), -absurd, absurd))
+
+
+def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:
+    """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
+    `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
+    through its cylinder's end leaves no volume to the air."""
+    absurd = StepSettings.absurd
+    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < absurd)]
+    if not known:
+        return np.zeros_like(base)
+    return np.asarray(np.mean([(there[i] - base) / steps[i] for i in known], axis=0))
 
 
 class Problem(ABC):

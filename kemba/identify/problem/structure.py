@@ -1,7 +1,9 @@
-"""Another structure as a candidate: orifice chambers in place of the first-order ones.
+"""Candidates that need more than their kind: another structure, and the line of the supply.
 
-The share `a` of the rod's force comes from orifice chambers and 1 - a from the chambers of the
-model: 0 is the model as it is, 1 the other structure. So it competes with every other effect.
+Orifice chambers in place of the first-order ones: the share `a` of the rod's force comes from them
+and 1 - a from the chambers of the model, so that 0 is the model as it is and 1 the other structure.
+An orifice of infinite area is as good as none, so the supply line is searched by the reciprocal of
+its area, which is 0 where all of the tank's pressure reaches the valves.
 """
 
 from __future__ import annotations
@@ -13,18 +15,27 @@ from typing import Annotated, Any, ClassVar
 
 from kemba.effects.base import At, Contribution
 from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.identify.problem.types import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.quantity import Param, Quantity, Tolerance
 
 ORIFICE = "chambers:orifice"
+
+
 LEVEL = "level"
+
+
 FIGURES = {  # as a model that has orifice chambers calls them: as the candidate does
     **{f"orifice_chamber.{k}": k for k in ("a_fill", "a_vent", "V_e", "V_r", "n")},
     "orifice_chamber.gauge": LEVEL,
 }
+
+
 # effects that those figures stand for, once they are free
 FREE_THEN = ("supply_scale", "rise_time_scale")
+
+
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
 
 
@@ -131,3 +142,41 @@ def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:
     figures = {k: v for k, v in values.items() if k not in ("a", "level")}
     gauge = [float(f"{values.get('level', 1.0) * g:.6g}") for g in OrificeChamber().gauge]
     return {"kind": "orifice_chamber", **figures, "gauge": gauge}
+
+
+LINE = "supply_line"
+
+
+class LineSettings:
+    """Where the supply line's figures are looked for."""
+
+    none = 1e3  # reciprocal of an orifice that is none [m-2]: 200 times a valve's area
+    size = 1.5e5  # reciprocal that is neither small nor large [m-2]
+    largest = 1e6  # largest reciprocal: an orifice of 1 mm2 [m-2]
+    volume = 0.7  # prior width of the logarithm of the volume: a factor of two
+    reach = 30.0  # a volume is looked for within this factor
+
+
+class LineResistance(SupplyLine):
+    """The supply line by the reciprocal `r` of its orifice."""
+
+    r: Annotated[float, Param("m-2", 1.5e5, lower=0.0, doc="1/a, 0: no orifice")] = 0.0
+
+    off: ClassVar[dict[str, float]] = {"r": 0.0}
+    nominal: ClassVar[dict[str, Tolerance]] = {}
+
+    def evaluate(self, at: At) -> Contribution:
+        area = 1.0 / (self.r + LineSettings.none)
+        return SupplyLine.evaluate(self.bind({"a": area}), at)  # type: ignore[arg-type]
+
+
+def line_candidates(model: Model) -> dict[str, Candidate]:
+    """The supply line, where the model's chambers publish their flow and it has no line yet."""
+    drawing = any("draw_e" in effect.publishes for effect in model.effects)
+    if not drawing or any(effect.kind == LINE for effect in model.effects):
+        return {}
+    settings, volume = LineSettings, float(SupplyLine().V)
+    lead = Parameter("r", "m-2", 0.0, settings.size, 0.0, settings.largest)
+    ends = (volume / settings.reach, volume * settings.reach)
+    hose = Parameter("V", "m3", volume, settings.volume, *ends, volume)
+    return {LINE: Candidate(LINE, lead, (hose,), reciprocal={"r": ("a", "m2")})}

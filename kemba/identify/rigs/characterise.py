@@ -17,12 +17,17 @@ from scipy.optimize import least_squares
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-from kemba.identify.evidence.windows import rms
-from kemba.identify.problem.problem import Array, Problem
+from kemba.identify.infer.joint import TOLD, apart_between_runs, divisions, half_widths
+from kemba.identify.infer.windows import rms
+from kemba.identify.logs.excerpt import excerpts
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import read_logs, taken_on
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
-from kemba.identify.written.joint import TOLD
-from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
+from kemba.logs import load_map, log_files
+from kemba.model import load_model
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -179,3 +184,17 @@ def _unit(model: Model, name: str) -> str:
     param = model.parameters[name][0]
     turns = model.mechanism.logged.get("axis/q") == "rad"
     return param.rotary if turns and param.rotary else param.unit
+
+
+def characterise_logs(
+    logs: Sequence[str | Path], model: str, column_map: str | Path | None = None
+) -> RigFit:
+    """The figures of the rig of `model`, and of its effects, from logs (or folders of them).
+
+    Raises KembaError; BadData where the logs cannot be right.
+    """
+    read = read_logs(log_files(logs), load_map(column_map) if column_map else None)
+    built = load_model(model)
+    taken_on(read, built.mechanism)
+    check_logs(read)
+    return fit_rig(excerpts(read)[0], built)

@@ -8,7 +8,7 @@ from copy import copy
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.bench.missing import lagged
+from kemba.identify.problem.missing_force import lagged
 from kemba.identify.problem.noise import Colour, learn, whiten
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import is_straight
@@ -21,10 +21,9 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
-from kemba.identify.rigs.candidates import possible_candidates
-from kemba.identify.rigs.predictor import Predictor
+from kemba.identify.rigs.candidates import possible_candidates, sized, usual_force
+from kemba.identify.rigs.prediction import Predictor
 from kemba.identify.rigs.rig_log import RigLog, prepare
-from kemba.identify.rigs.sizes import sized, usual_force
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 

@@ -9,9 +9,8 @@ from kemba.identify.problem.candidates import (
     geometry_candidates,
     leg_candidates,
 )
-from kemba.identify.problem.line import line_candidates
-from kemba.identify.problem.problem import Candidate, Parameter
-from kemba.identify.problem.structure import structure_candidates
+from kemba.identify.problem.structure import line_candidates, structure_candidates
+from kemba.identify.problem.types import Candidate, Parameter
 from kemba.model.model import Model
 
 GROUND = ("ground_compliance", "ground_friction", "contact")

@@ -19,8 +19,8 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.problem.types import Array
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.identify.robot.batch import ResampledLog
+from kemba.identify.robot.physics import Physics
 
 Columns = Mapping[str, Array]
 Change = Callable[[Columns], dict[str, Array]]

@@ -11,9 +11,8 @@ from typing_extensions import Self
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Problem, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
-from kemba.identify.problem.slopes import mean_slope
 from kemba.identify.problem.structure import (
     FIGURES,
     FREE_THEN,
@@ -31,22 +30,21 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
+from kemba.identify.robot.batch import Batch, resample
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import first_reference
-from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.force_channels import robot_force_channels
-from kemba.identify.robot.formulas import formula_columns
+from kemba.identify.robot.forces import formula_columns, robot_force_channels, robot_missing
 from kemba.identify.robot.geometry import remarks, standing_lengths
-from kemba.identify.robot.labels import describe
-from kemba.identify.robot.missing import robot_missing
-from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.colour import Noise
-from kemba.identify.robot.motion.expected import expected_power, predicted_error
-from kemba.identify.robot.motion.resampled import resample
-from kemba.identify.robot.noise import learnt_from, stated_noise, with_drifts
-from kemba.identify.robot.operating_point import changes, robot_operating_point
-from kemba.identify.robot.state import LinearisedState, linearise_at
+from kemba.identify.robot.noise import (
+    Noise,
+    expected_power,
+    predicted_error,
+    stated_noise,
+    with_drifts,
+)
+from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.reference import ForceDensity, first_reference
+from kemba.identify.robot.rows import changes, describe, robot_operating_point
+from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
 from kemba.identify.robot.validate import faults_of
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory

@@ -15,24 +15,25 @@ from functools import cached_property
 import numpy as np
 
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
+from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags, Theta
+from kemba.identify.robot.air import Forces, air_states, read_inputs
+from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
-from kemba.identify.robot.dynamics.forces import Forces
-from kemba.identify.robot.dynamics.inputs import air_states, read_inputs
-from kemba.identify.robot.dynamics.linear import LinearisedMotion, linearise_along, smoothed
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import (
+from kemba.identify.robot.contact import ContactSchedule, loaded
+from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
+from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
+from kemba.identify.robot.noise import Noise, SensorNoiseSettings, learnt_noise, stated_noise
+from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.reference import (
+    LOOSE,
+    ForceDensity,
     Reference,
     densities,
     first_reference,
     read_schedules,
 )
-from kemba.identify.robot.dynamics.settings import LOOSE, ForceDensity
-from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.colour import Noise
-from kemba.identify.robot.motion.contact import ContactSchedule, loaded
-from kemba.identify.robot.motion.filter import FilterGains, at_once, gains, innovations
-from kemba.identify.robot.motion.sensing import ahead, sensed, whole_rows
+from kemba.identify.robot.sensing import ahead, sensed, whole_rows
 
 
 class StateSettings:
@@ -244,3 +245,25 @@ def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     p = np.clip(p, *physics.bounds)
     late = [physics.base.timing(leg, theta) for leg in physics.legs]
     return p, np.repeat(late, 2, axis=0)  # both valves of a leg
+
+
+def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
+    """The noise of each channel, learnt from the rows `left` (rows,) that a flexible model leaves;
+    as stated where a correlation time is stated. `drifts`: slow drifts are looked for, too."""
+    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings
+    k = motion.ref.q.shape[2]
+    pushed = motion.inverse @ motion.channels[..., :k]
+    most = np.where(batch.stated, settings.stated, settings.guessed)
+    found = learnt_noise(
+        motion.system,
+        state.gain,
+        state.spread(left),
+        batch.sigma,
+        batch.h,
+        [pushed[..., i] for i in range(k)],
+        most,
+        drifts,
+    )
+    stated = stated_noise(batch)
+    known = np.isfinite(batch.memory)
+    return tuple(s if on else f for s, f, on in zip(stated, found, known, strict=True))

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from kemba.identify.compare.compare import conditions
 from kemba.identify.discover import Discovery
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import free_starts
-from kemba.identify.problem.problem import Array, Rows
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.windows import free_starts
+from kemba.identify.problem.types import Array, Rows
 from kemba.plotting.bands import plot_bands, plot_ladder
 from kemba.plotting.heat import plot_heat_map
 from kemba.plotting.study.comparison import bands_of, in_words, place_of

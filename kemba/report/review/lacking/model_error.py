@@ -9,9 +9,8 @@ from html import escape
 import numpy as np
 
 from kemba.identify.compare.compare import Comparison
-from kemba.identify.compare_logs import compare_read
 from kemba.identify.problem.types import MissingForce
-from kemba.identify.workflow import check_all, model_of
+from kemba.identify.workflow import check_all, compare_read, model_of
 from kemba.report.review.charts import Book, Chart, Curve
 from kemba.report.review.html import meter, table
 from kemba.report.review.lacking.heat import heat_table
