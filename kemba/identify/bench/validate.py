@@ -39,10 +39,7 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
         "piston/F has the reversed sign (pushing is positive)",
         replace(run, measured={**run.measured, "piston/F": -force}),
     )
-    yield (
-        "valve/extend and valve/retract are swapped",
-        replace(run, commands=(retract, extend)),
-    )
+    yield ("valve/extend and valve/retract are swapped", replace(run, commands=(retract, extend)))
     yield (
         "valve/extend and valve/retract are inverted (1 is on)",
         replace(run, commands=(_inverted(extend), _inverted(retract))),

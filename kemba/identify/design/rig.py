@@ -207,10 +207,7 @@ def design_rig_test(
 
     None where a rig cannot show two of them.
     """
-    bench, settings = (
-        VirtualBench(model, ExperimentSettings.rows),
-        RigCourseSettings,
-    )
+    bench, settings = (VirtualBench(model, ExperimentSettings.rows), RigCourseSettings)
     coarse = VirtualBench(model, ExperimentSettings.coarse)
     say("judging the standard tests")
     standards = list(judged_menu(coarse, rivals))

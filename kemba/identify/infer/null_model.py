@@ -140,11 +140,7 @@ class Baseline:
     jacobian: Array
     residual: Array
 
-    def __init__(
-        self,
-        problem: Problem,
-        begin: Mapping[str, float] | None = None,
-    ) -> None:
+    def __init__(self, problem: Problem, begin: Mapping[str, float] | None = None) -> None:
         self.problem, self.begin = problem, dict(begin or {})
         self.division = Division(problem)
         self.table: dict[Hypothesis, float] = {}
@@ -203,11 +199,7 @@ class Baseline:
         self.table = ranker.table()
 
     def judged(
-        self,
-        hypothesis: Hypothesis,
-        fit: Fit,
-        names: Names,
-        slopes: Array,
+        self, hypothesis: Hypothesis, fit: Fit, names: Names, slopes: Array
     ) -> LinearisationPoint:
         """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
         r = self.problem.residual(fit.theta)

@@ -56,10 +56,7 @@ class Frozen:
 
 
 def refit(
-    problem: Problem,
-    hypothesis: Hypothesis,
-    start: Mapping[str, float],
-    frozen: Frozen,
+    problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float], frozen: Frozen
 ) -> Fit:
     """The best theta with these effects on, from `start` (and, where shapes exist, others)."""
     best: Fit | None = None
@@ -112,11 +109,7 @@ class _LeastSquares:
     """One least-squares run in scaled coordinates."""
 
     def __init__(
-        self,
-        problem: Problem,
-        hypothesis: Hypothesis,
-        start: Mapping[str, float],
-        frozen: Frozen,
+        self, problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float], frozen: Frozen
     ) -> None:
         self.problem, self.frozen = problem, frozen
         self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}

@@ -27,11 +27,7 @@ class Doubts:
 
 
 def doubts_about(
-    search: Search,
-    belief: Belief,
-    drift: Drift | None,
-    kept: HeldOut | None,
-    ended: bool = False,
+    search: Search, belief: Belief, drift: Drift | None, kept: HeldOut | None, ended: bool = False
 ) -> Doubts:
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""

@@ -80,11 +80,7 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
 
 
 def air_states(
-    physics: Physics,
-    batch: Batch,
-    inputs: Sequence[Inputs],
-    p: Array,
-    among: Index | None = None,
+    physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array, among: Index | None = None
 ) -> tuple[Array, Array]:
     """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `among`: states
     that are asked for (None: all)."""

@@ -36,10 +36,7 @@ def valve_mix_ups(
     swapped = {
         f"{leg}/valve/{a}": f"{leg}/valve/{b}" for leg in legs for a, b in (sides, sides[::-1])
     }
-    yield (
-        "valve/extend and valve/retract are swapped",
-        [_taken(log, swapped) for log in logs],
-    )
+    yield ("valve/extend and valve/retract are swapped", [_taken(log, swapped) for log in logs])
     same = {name: name for name in swapped}
     yield (
         "valve/extend and valve/retract are inverted (1 is on)",
