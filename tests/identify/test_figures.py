@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import ClassVar
 
 import numpy as np
@@ -44,13 +43,13 @@ class Filling(Problem):
     def limits(self, name: str) -> tuple[float, float]:
         return 0.01, 0.5
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         tau = np.clip(theta.get("tau", 0.1), 0.01, 0.5)
         y = 100.0 * (1.0 - np.exp(-self._time / tau))
         y = y + theta.get("pull.a", 0.0) + theta.get("tilt.a", 0.0) * self._time
         return np.asarray(y - self.measured)
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         label = np.full(800, "filling")
         run = np.repeat([0, 1], 400)
         return Rows(run, np.zeros(800, int), self._time, label, label, ("F",), np.ones(800))

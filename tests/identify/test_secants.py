@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import numpy as np
 import pytest
 
@@ -28,12 +26,12 @@ class Edges(Problem):
         self._time = np.arange(0.0, 0.4, row)
         self._row = row
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         since = self._time[:, None] - np.array(EDGES) - theta.get("late.T", 0.0)
         high = np.clip(since / self._row + 0.5, 0.0, 1.0).sum(axis=1)  # each row is a mean
         return np.asarray(100.0 * high + theta.get("bend.F", 0.0) ** 2)
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         n, nought = len(self._time), np.zeros(len(self._time), dtype=int)
         label = np.full(n, "")
         return Rows(nought, nought, self._time, label, label, ("F",), np.ones(n))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import numpy as np
 import pytest
 
@@ -41,7 +39,7 @@ class Late(Problem):
         self.measured = np.zeros(len(noise))
         self.measured = self.residual({"gain": 1.01, **truth}) + noise
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         falls = np.arange(len(EDGES)) % 2
         late = theta.get("late.T", 0.0) + falls * theta.get("falls_late.T", 0.0)
         since = self._time[:, None] - EDGES - late
@@ -49,7 +47,7 @@ class Late(Problem):
         drag = theta.get("drag.F", 0.0) * np.tanh(5.0 * np.sin(7.0 * self._time))
         return np.tile(30.0 * theta.get("gain", 1.0) * high + drag, RUNS) - self.measured
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         n = RUNS * len(self._time)
         run, label = np.repeat(np.arange(RUNS), len(self._time)), np.full(n, "moving")
         time = np.tile(self._time, RUNS)
@@ -97,9 +95,9 @@ def test_a_step_to_where_nothing_can_be_predicted_is_not_taken() -> None:
     class Explodes(Late):
         """Unstable as soon as it is late, as a stiff law far from its figures."""
 
-        def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+        def residual(self, theta: Theta) -> Array:
             grown = 1e200 if theta.get("late.T") else 1.0
-            return grown * super().residual(theta, runs)
+            return grown * super().residual(theta)
 
     late, explodes = Late(SMALL), Explodes({})
     explodes.measured = late.measured

@@ -102,18 +102,14 @@ def _sigma(predicted: PredictedLogs) -> Array:
     )
 
 
-class FormulaSettings:
-    """Constants of the simple force terms that are tried."""
-
-    memories = (0.001, 0.006, 0.02, 0.06, 0.2)  # times for which a switching is remembered [s]
-    creeps = (0.002, 0.006, 0.015)  # travel over which a hysteresis turns round [m]
-    speed = 0.3  # speed by which speeds are scaled [m.s-1]
+MEMORIES = (0.001, 0.006, 0.02, 0.06, 0.2)  # times for which a switching is remembered [s]
+CREEPS = (0.002, 0.006, 0.015)  # travel over which a hysteresis turns round [m]
+SPEED = 0.3  # speed by which speeds are scaled [m.s-1]
 
 
 def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on;
     `stroke` [m]."""
-    settings = FormulaSettings
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
@@ -137,7 +133,7 @@ def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str
     yield "a", motion.a
     yield "u_e", u_e
     yield "u_r", u_r
-    for travel in settings.creeps:
+    for travel in CREEPS:
         yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
@@ -146,12 +142,12 @@ def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
     times functions of how long ago each valve was on. `u` (n, 2): share of each valve being on."""
     from scipy.signal import lfilter  # it takes half a second
 
-    settings, step = FormulaSettings, float(np.median(np.diff(motion.time)))
-    x, v = motion.x / stroke - 0.5, motion.v / settings.speed
+    step = float(np.median(np.diff(motion.time)))
+    x, v = motion.x / stroke - 0.5, motion.v / SPEED
     places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
     histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]
     for valve in u.T:
-        for memory in settings.memories:
+        for memory in MEMORIES:
             keep = np.exp(-step / memory)
             histories.append(lfilter([1 - keep], [1, -keep], valve, zi=[keep * valve[0]])[0])
     return np.stack([p * h for p in places for h in histories], axis=1)

@@ -127,12 +127,9 @@ def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylin
         return np.asarray(ATMOSPHERE + states[f"chamber/{chamber}/F"] / area)
 
 
-class StartSettings:
-    """How a log begins."""
-
-    # beginning of a log that tells whether a valve had just been switched [s]: twice the slowest
-    # rise time of Table I
-    early = 0.08
+# beginning of a log that tells whether a valve had just been switched [s]: twice the slowest
+# rise time of Table I
+EARLY = 0.08
 
 
 @dataclass(frozen=True)
@@ -209,7 +206,7 @@ def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
     trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
     if len(trials) == 1:
         return log
-    end = log.motion.time[0] + StartSettings.early
+    end = log.motion.time[0] + EARLY
     early = log.motion.time[log.keep["piston/F"]] < end
 
     def cost(trial: BenchLog) -> float:

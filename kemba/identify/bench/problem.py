@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -42,17 +42,13 @@ from kemba.identify.problem.types import (
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class BenchProblemSettings:
-    """How well pressure sensors are known, and what counts as a change and as rest."""
-
-    # prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
-    # atmosphere's or that of a vacuum
-    pressure_zero = 2e5
-    # prior sigma of the scale error of a pressure sensor: nominal figures are off by 1 to 3 %
-    pressure_gain = 0.02
-    step = 0.1  # step of finite differences of a start, as a share of the state's scale
-    rest = 2e-3  # speed below which the piston rests [m.s-1]
+# prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
+# atmosphere's or that of a vacuum
+PRESSURE_ZERO = 2e5
+# prior sigma of the scale error of a pressure sensor: nominal figures are off by 1 to 3 %
+PRESSURE_GAIN = 0.02
+STEP = 0.1  # step of finite differences of a start, as a share of the state's scale
+REST = 2e-3  # speed below which the piston rests [m.s-1]
 
 
 class BenchProblem(Problem):
@@ -92,10 +88,9 @@ class BenchProblem(Problem):
         self._state_scale = {q.name: q.scale for q in model.states.values()}
         for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
-        known = BenchProblemSettings
         for channel in self.channels[1:]:
-            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, known.pressure_zero)
-            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, known.pressure_gain)
+            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, PRESSURE_ZERO)
+            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, PRESSURE_GAIN)
         self.colour: Mapping[tuple[int, int], Colour] = {}
         self.left: Array | None = None
 
@@ -108,48 +103,44 @@ class BenchProblem(Problem):
     def channels(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(c for log in self.logs for c in log.measured))
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         """Whitened residuals (n,), run by run, then channel by channel."""
         parts = []
-        for i in range(len(self.logs)) if runs is None else runs:
+        for i in range(len(self.logs)):
             for channel, r in self.predicted.standardised(theta, i).items():
                 colour = self.colour.get((i, self.channels.index(channel)))
                 parts.append(r if colour is None else whiten(r, colour))
         return np.concatenate(parts)
 
-    def jacobian(
-        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-    ) -> Array:
+    def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """Secants (n, k); the start of a log moves its own rows only."""
         names = list(names)
         starts = self.predicted.starts
         plain = [n for n in names if n not in starts]
-        columns = dict(zip(plain, super().jacobian(theta, plain, runs).T, strict=True))
-        columns |= self._start_columns(theta, [n for n in names if n in starts], runs)
+        columns = dict(zip(plain, super().jacobian(theta, plain).T, strict=True))
+        columns |= self._start_columns(theta, [n for n in names if n in starts])
         return np.stack([columns[n] for n in names], axis=1)
 
-    def _start_columns(
-        self, theta: Theta, names: list[str], runs: Collection[int] | None
-    ) -> dict[str, Array]:
+    def _start_columns(self, theta: Theta, names: list[str]) -> dict[str, Array]:
         """Columns (n,) of the initial states: one evaluation moves the starts of all runs."""
         if not names:
             return {}
-        starts, share = self.predicted.starts, BenchProblemSettings.step
-        at = self.rows(runs).run
-        base = self.residual(theta, runs)
+        starts, share = self.predicted.starts, STEP
+        at = self.rows().run
+        base = self.residual(theta)
         columns: dict[str, Array] = {}
         for state in {starts[n][1] for n in names}:
             own = {n: starts[n][0] for n in names if starts[n][1] == state}
             step = {n: theta.get(n, 0.0) + share * self._state_scale[state] for n in own}
-            change = self.residual({**theta, **step}, runs) - base
+            change = self.residual({**theta, **step}) - base
             slope = change / (share * self._state_scale[state])
             columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
         return columns
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
-        rest = BenchProblemSettings.rest
+    def rows(self) -> Rows:
+        rest = REST
         parts: list[tuple[np.ndarray, ...]] = []
-        for i in range(len(self.logs)) if runs is None else runs:
+        for i in range(len(self.logs)):
             log = self.logs[i]
             for c in log.measured:
                 keep = log.keep[c]

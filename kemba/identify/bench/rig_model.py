@@ -25,14 +25,11 @@ V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # si
 Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 
 
-class RigModelSettings:
-    """Integration of the chambers along an imposed motion."""
-
-    step = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
-    chunk = 512  # steps per call of a compiled function
-    # time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1
-    # ms; a log does not say on which side its sample was taken
-    blur = 0.75e-3
+STEP = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
+CHUNK = 512  # steps per call of a compiled function
+# time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1
+# ms; a log does not say on which side its sample was taken
+BLUR = 0.75e-3
 
 
 @dataclass(frozen=True)
@@ -111,7 +108,7 @@ class RigModel:
         n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
         inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
-        chunk = RigModelSettings.chunk
+        chunk = CHUNK
         inputs = np.pad(inputs, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
         fixed = np.repeat(p[:, None], chunk, axis=1)
         step, states = self._mapped("step", chunk), [s0[:, None]]
@@ -162,7 +159,7 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     m depends on the number of events only, so that compiled functions can be used again.
     """
     inside = np.clip(events, samples[0], samples[-1])
-    pieces = np.ceil(np.diff(samples) / RigModelSettings.step - 1e-6).astype(int)
+    pieces = np.ceil(np.diff(samples) / STEP - 1e-6).astype(int)
     fill = [
         np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
         for i in np.flatnonzero(pieces > 1)
@@ -182,7 +179,7 @@ def share(intervals: Array, times: Array) -> Array:
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    blur = RigModelSettings.blur
+    blur = BLUR
     later = np.interp(times + blur, knots, on_time)
     earlier = np.interp(times - blur, knots, on_time)
     return np.asarray(np.clip((later - earlier) / (2 * blur), 0.0, 1.0))

@@ -28,11 +28,7 @@ from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import Array, MissingForce, Rows, Texts, Theta
 from kemba.units import short
 
-
-class CompareSettings:
-    """How an error is spoken of that is too large for a good model."""
-
-    fair = 1.5  # error ratio below which it nearly explains them
+FAIR = 1.5  # error ratio below which it nearly explains them
 
 
 @dataclass(frozen=True)
@@ -144,7 +140,7 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tu
     if found.q_value < BinSettings.false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
-    fair = CompareSettings.fair
+    fair = FAIR
     bins = condition_bins(rows, region, window.first, sums)
     clean = not any(c.significant and c.ratio > fair for c in bins)
     return rms(sums), clean and rms(sums) <= BinSettings.tolerated
@@ -200,7 +196,7 @@ def phrase(found: Comparison) -> str:
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
             f"as is usual, and then it would be {short(found.tolerant_ratio)} times."
         )
-    grade = "nearly explains" if found.noise_ratio < CompareSettings.fair else "does not explain"
+    grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."

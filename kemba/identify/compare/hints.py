@@ -73,12 +73,9 @@ def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
     return Tolerant(residual + columns @ off, float(q.min()))
 
 
-class HintSettings:
-    """When a hint is certain."""
-
-    certain = 1e-4  # p-value below which a hint is certain, over all that were tried
-    dependent = 1.5  # z scores are divided by this: rows are not quite independent
-    information = 4.0  # information on a parameter, per size squared, that a run must give
+CERTAIN = 1e-4  # p-value below which a hint is certain, over all that were tried
+DEPENDENT = 1.5  # z scores are divided by this: rows are not quite independent
+INFORMATION = 4.0  # information on a parameter, per size squared, that a run must give
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,7 @@ class Response:
 
     @property
     def certain(self) -> bool:
-        certain = HintSettings.certain
+        certain = CERTAIN
         return bool(np.abs(self.z[self.peak]) > normal_at(certain / (2 * self.tests)))
 
     @property
@@ -152,7 +149,7 @@ def _strongest(
         if name in changes:
             own = rows.run == i
             rise[own] = risen(*changes[name], rows.time[own])
-    dependent = HintSettings.dependent
+    dependent = DEPENDENT
     best, tests = None, commands * len(rows.channels)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
@@ -184,7 +181,6 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
     same in all groups.
     """
-    settings = HintSettings
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -193,11 +189,11 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     n = known.by_nuisance
     solve = np.linalg.inv(n.T @ n + np.eye(n.shape[1]))
     for i, c in enumerate(known.leads):
-        told = np.flatnonzero(power[:, i] > settings.information)
+        told = np.flatnonzero(power[:, i] > INFORMATION)
         own = cross[told, i]
         information = np.diag(power[told, i]) - own @ solve @ own.T
         p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
-        if p < settings.certain / len(known.leads):
+        if p < CERTAIN / len(known.leads):
             weight = float(-np.log10(max(p, 1e-300)))
             what = f"no one value of {c.key} fits {text}"
             yield Hint("conflict", f"{what}, so the model lacks something else", weight)

@@ -41,10 +41,7 @@ class ExperimentSettings:
     rivals = 4  # effects that are to be told apart: few
 
 
-class SeparationSettings:
-    """How evidence between rivals is predicted."""
-
-    steps = 3  # steps of the fit of a rival
+STEPS = 3  # steps of the fit of a rival
 
 
 class DesignSearchSettings:
@@ -178,7 +175,7 @@ class _Side:
         least = 0.5 * float(gap @ gap)
         figures = np.array([name in self.problem.nuisance for name in self.names])
         far = np.where(figures, LinearSettings.widths, np.inf)
-        for _ in range(SeparationSettings.steps):
+        for _ in range(STEPS):
             z = np.clip(z - np.linalg.solve(h, self.columns.T @ gap + z), -far, far)
             try:
                 gap = self.problem.residual(self._moved(z)) - truth

@@ -32,12 +32,9 @@ def drift_columns(problem: Problem) -> tuple[Array, Array]:
     return problem.whiten(np.hstack(columns)), np.concatenate(widths)
 
 
-class TermSettings:
-    """Which terms make a formula."""
-
-    width = 10.0  # prior of a term's force, in sigmas of the noise where it acts most
-    terms = 2  # most terms of a formula: a formula can be read
-    no_force = 1e-9  # force, in sigmas, of a term that acts nowhere: zero
+WIDTH = 10.0  # prior of a term's force, in sigmas of the noise where it acts most
+TERMS = 2  # most terms of a formula: a formula can be read
+NO_FORCE = 1e-9  # force, in sigmas, of a term that acts nowhere: zero
 
 
 @dataclass(frozen=True)
@@ -68,12 +65,12 @@ def extended(search: Search, formulas: Mapping[str, Array]) -> tuple[Ranker, Arr
 
     Beside them every sensor may drift: a formula is what no drift explains.
     """
-    mode, settings = search.points[NULL].mode, TermSettings
+    mode = search.points[NULL].mode
     names = {f"term{i}": formula for i, formula in enumerate(formulas)}
     columns = np.stack([formulas[f] for f in names.values()], axis=1)
     reach = np.percentile(np.abs(columns), 99, axis=0)
-    widths = settings.width / np.maximum(reach, settings.no_force)
-    keep = [i for i in range(len(names)) if reach[i] > settings.no_force]
+    widths = WIDTH / np.maximum(reach, NO_FORCE)
+    keep = [i for i in range(len(names)) if reach[i] > NO_FORCE]
     names = {n: f for i, (n, f) in enumerate(names.items()) if i in keep}
     columns, widths = columns[:, keep], widths[keep]
     candidates = {
@@ -132,7 +129,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
 
 def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:
     """Terms chosen one after the other; each must add enough evidence."""
-    least, most = by_chance(len(names)), TermSettings.terms
+    least, most = by_chance(len(names)), TERMS
     chosen: Hypothesis = ()
     reached = ranker.score(chosen).log_evidence
     for _ in range(most):

@@ -122,10 +122,7 @@ def effect_bounds(
 Names = tuple[str, ...]
 
 
-class NullModelSettings:
-    """How the model as it is is fitted."""
-
-    rounds = 2  # linear steps
+ROUNDS = 2  # linear steps
 
 
 class Baseline:
@@ -180,7 +177,7 @@ class Baseline:
         known = problem.jacobian({}, names)
         slopes = known[:, [names.index(n) for n in free]]
         theta: dict[str, float] = {}
-        for _ in range(NullModelSettings.rounds):
+        for _ in range(ROUNDS):
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
             theta = estimate(problem, linear, best_fit(linear))

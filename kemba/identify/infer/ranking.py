@@ -17,17 +17,13 @@ from kemba.identify.infer.selection import Belief, strength
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, SpikeSlabSettings, share_of
 from kemba.identify.problem.types import Array, Candidate, Parameter
 
-
-class RankingSettings:
-    """What the ranking says of each effect."""
-
-    # two explanations are equivalent when their evidence differs by less [nats]: Kass and Raftery
-    # 1995, 'strong' evidence begins at 3 nats
-    same = 3.0
-    shown = 8  # effects in the ranking: fits a screen
-    # largest probability of all effects together where nothing is significant: nothing is then the
-    # likeliest
-    doubted = 0.5
+# two explanations are equivalent when their evidence differs by less [nats]: Kass and Raftery
+# 1995, 'strong' evidence begins at 3 nats
+SAME = 3.0
+SHOWN = 8  # effects in the ranking: fits a screen
+# largest probability of all effects together where nothing is significant: nothing is then the
+# likeliest
+DOUBTED = 0.5
 
 
 def ranked(
@@ -50,7 +46,7 @@ def ranked(
     )
     found = []
     before = error(search, NULL, kept)
-    for effect in order[: max(RankingSettings.shown, len(whole))]:
+    for effect in order[: max(SHOWN, len(whole))]:
         written = joint is not None and effect in whole
         hypothesis = (whole if written else best) if effect in {*whole, *best} else NULL
         hypothesis = hypothesis or _likeliest_with(search, effect)
@@ -82,7 +78,7 @@ def _likeliest_with(search: Search, effect: str) -> Hypothesis:
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
     """Where nothing was found significant, nothing is the likeliest."""
-    most = RankingSettings.doubted
+    most = DOUBTED
     rest = sum(p for h, p in probability.items() if h)
     scale = min(1.0, most / rest) if rest > 0 else 1.0
     return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
@@ -92,7 +88,7 @@ def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
     """Effects that could stand in this one's place in the answer: they explain the data, or predict
     left-out data, as well."""
     hypothesis = belief.best
-    own, same = search.points[hypothesis].log_evidence, RankingSettings.same
+    own, same = search.points[hypothesis].log_evidence, SAME
     near = {h for h, p in search.points.items() if own - p.log_evidence < same}
     rest = set(hypothesis) - {effect}
     found: set[str] = set()

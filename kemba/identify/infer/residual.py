@@ -20,16 +20,13 @@ from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import Array, Labels
 from kemba.units import short
 
-
-class RunConsistencySettings:
-    """When a parameter differs from run to run."""
-
-    clear = 100.0  # gain of a value per run over one value for all that is asked for [nats]
-    share_of_rows = 0.01  # the same per row of the logs [nats]
-    share = 0.1  # the same as a share of the gain of the answer itself
-    spread = 1.2  # sizes between the smallest and the largest value
-    forgiven = 0.15  # error of a run, in sigmas of one row, that all its rows may share
-    informed = 0.2  # a run is asked where it gives the parameter with this sigma, in sizes
+# When a parameter differs from run to run.
+CLEAR = 100.0  # gain of a value per run over one value for all that is asked for [nats]
+SHARE_OF_ROWS = 0.01  # the same per row of the logs [nats]
+SHARE = 0.1  # the same as a share of the gain of the answer itself
+SPREAD = 1.2  # sizes between the smallest and the largest value
+FORGIVEN = 0.15  # error of a run, in sigmas of one row, that all its rows may share
+INFORMED = 0.2  # a run is asked where it gives the parameter with this sigma, in sizes
 
 
 @dataclass(frozen=True)
@@ -51,7 +48,7 @@ class Drift:
 
 def drifting(search: Search, best: Hypothesis) -> Drift | None:
     """The clearest case of a parameter that differs, in the error that the best answer leaves."""
-    settings, spike = RunConsistencySettings, SpikeSlabSettings.spike
+    spike = SpikeSlabSettings.spike
     problem, point = search.problem, search.points[best]
     if len(problem.runs) < 2:
         return None
@@ -63,8 +60,8 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     for effect, candidate in problem.candidates.items():
         column = search.base.jacobian[:, search.points[()].linear.index(candidate.key)]
         gram, slope = _sums(column * column, run), _sums(column * residual, run)
-        error = (1.0 + settings.forgiven**2 * count) / np.maximum(gram, 1e-12)
-        keep = error < (settings.informed * candidate.lead.size) ** 2
+        error = (1.0 + FORGIVEN**2 * count) / np.maximum(gram, 1e-12)
+        keep = error < (INFORMED * candidate.lead.size) ** 2
         if keep.sum() < 2:
             continue
         gram, slope = gram[keep], slope[keep]
@@ -72,11 +69,11 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
         own = -slope / gram
         shared = float(np.sum(own / narrow) / np.sum(1.0 / narrow))
         nats = 0.5 * float(np.sum((own - shared) ** 2 / narrow))
-        if np.ptp(own) > settings.spread * candidate.lead.size:
+        if np.ptp(own) > SPREAD * candidate.lead.size:
             values = tuple(float(candidate.lead.off + a) for a in own)
             found.append(Drift(effect, candidate.key, values, nats))
     clearest = max(found, key=lambda d: d.nats, default=None)
-    least = max(settings.clear, settings.share * gained, settings.share_of_rows * len(residual))
+    least = max(CLEAR, SHARE * gained, SHARE_OF_ROWS * len(residual))
     if clearest is None or clearest.nats < least:
         return None
     return clearest
@@ -94,14 +91,12 @@ def _sums(values: Array, run: Labels) -> Array:
     return np.asarray(np.bincount(run, weights=values), dtype=float)
 
 
-class UnexplainedSettings:
-    """When error that repeats itself tells that something is missing."""
-
-    structure = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave
-    left = 0.1  # the same as a share of what the answer explains
-    clip = 30.0  # residuals are clipped at so many sigmas
-    ridges = (1e-4, 1e-2, 1.0)  # penalties of the regression that are tried
-    folds = 5  # blocks of time that are left out in turn: five
+# When error that repeats itself tells that something is missing.
+STRUCTURE = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave
+LEFT = 0.1  # the same as a share of what the answer explains
+CLIP = 30.0  # residuals are clipped at so many sigmas
+RIDGES = (1e-4, 1e-2, 1.0)  # penalties of the regression that are tried
+FOLDS = 5  # blocks of time that are left out in turn: five
 
 
 def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
@@ -110,18 +105,15 @@ def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     A regression on everything that a force could depend on is learnt on some blocks of time. What
     it predicts in the other blocks is structure: noise cannot be predicted, however coloured.
     """
-    settings = UnexplainedSettings
     left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
     if left_over is None:
         return 1.0, 0.0
-    r = np.clip(left_over.residual, -settings.clip, settings.clip)
+    r = np.clip(left_over.residual, -CLIP, CLIP)
     columns = left_over.features
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
     folds = _folds(left_over.run)
     power = float(np.mean(r**2))
-    left = min(
-        float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in settings.ridges
-    )
+    left = min(float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in RIDGES)
     return power, max(power - left, 0.0)
 
 
@@ -141,7 +133,7 @@ def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> A
 
 def _folds(run: Labels) -> Labels:
     """Which fold each row (n,) belongs to: runs are cut into blocks of time, dealt out in turn."""
-    folds = UnexplainedSettings.folds
+    folds = FOLDS
     labels = np.zeros(len(run), dtype=int)
     for i in np.unique(run):
         own = np.flatnonzero(run == i)
@@ -151,12 +143,11 @@ def _folds(run: Labels) -> Labels:
 
 def unfinished(search: Search, best: Hypothesis) -> bool:
     """Whether so much structure is left that the answer cannot be complete."""
-    settings = UnexplainedSettings
     power, structure = structured(search, best)
-    if not best or structure <= settings.structure:
-        return structure > settings.structure
+    if not best or structure <= STRUCTURE:
+        return structure > STRUCTURE
     before, _ = structured(search, NULL)
-    return structure > settings.left * max(before - power, 0.0)
+    return structure > LEFT * max(before - power, 0.0)
 
 
 BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
@@ -206,7 +197,7 @@ def pattern_left(search: Search, best: Hypothesis) -> str:
     plain = [force for force in found if force.largest > settings.negligible * force.usual]
     first = max(plain, key=lambda force: force.gain, default=None)
     gained = point.log_evidence - search.points[NULL].log_evidence
-    least = max(settings.plain, UnexplainedSettings.left * gained)
+    least = max(settings.plain, LEFT * gained)
     if first is None or first.gain < least * point.fitted_error**2:
         return ""
     return str(first)

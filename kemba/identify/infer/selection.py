@@ -36,13 +36,9 @@ from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.sensor_faults import is_fault
 
-
-class ParsimonySettings:
-    """When left-out data choose among hypotheses that explain the data as well."""
-
-    # of what a larger answer leaves beyond the noise, what it must explain more: a tenth; 0.18
-    # gives the same answer on a real drive, 0.04 a lag more
-    share = 0.1
+# of what a larger answer leaves beyond the noise, what it must explain more: a tenth; 0.18
+# gives the same answer on a real drive, 0.04 a lag more
+SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -204,7 +200,7 @@ def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     """
     rows = search.points[larger].windowed.count.sum()
     left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
-    return window_gain(search, larger, smaller).nats < ParsimonySettings.share * left
+    return window_gain(search, larger, smaller).nats < SHARE * left
 
 
 def _least() -> float:

@@ -25,13 +25,9 @@ from kemba.identify.infer.spike_slab import NULL, Hypothesis, share_of
 from kemba.identify.infer.windows import error_ratio, excess
 from kemba.identify.problem.problem import Problem
 
-
-class FigureFitSettings:
-    """How the figures of another structure are found."""
-
-    rounds = 4  # times that the figures are fitted along a motion
-    gain = 0.02  # share of the error that another round must take away
-    ahead = 100.0  # gain from which another structure is built in, every effect free in both [nats]
+ROUNDS = 4  # times that the figures are fitted along a motion
+GAIN = 0.02  # share of the error that another round must take away
+AHEAD = 100.0  # gain from which another structure is built in, every effect free in both [nats]
 
 
 @dataclass(frozen=True)
@@ -46,13 +42,13 @@ class Rebuilt:
 
 def settled(problem: Problem) -> tuple[Problem, dict[str, float]]:
     """The problem along the motion that its best figures make of the data, and these figures."""
-    settings, free = FigureFitSettings, tuple(problem.nuisance)
+    free = tuple(problem.nuisance)
     best, figures, least, found = problem, dict[str, float](), np.inf, dict[str, float]()
-    for _ in range(settings.rounds):
+    for _ in range(ROUNDS):
         slopes = Frozen(free, problem.jacobian(found, free))
         found = refit(problem, NULL, found, slopes).theta
         error = error_ratio(problem, found)
-        if error > least * (1.0 - settings.gain):
+        if error > least * (1.0 - GAIN):
             break
         best, figures, least = problem, found, error
         problem = problem.relinearise(found)
@@ -71,7 +67,7 @@ def ahead(problem: Problem, theta: Mapping[str, float], error: float) -> Rebuilt
     built, figures = settled(plain.rebuilt(theta))
     rows = min(len(plain.residual({})), len(built.residual(figures)))
     nats = rows * (_unexplained(plain, {}) - _unexplained(built, figures))
-    return Rebuilt(built, figures, nats) if nats > FigureFitSettings.ahead else None
+    return Rebuilt(built, figures, nats) if nats > AHEAD else None
 
 
 def _unexplained(problem: Problem, theta: Mapping[str, float]) -> float:

@@ -34,14 +34,11 @@ def log_fault(
     return KembaError(f"{where}: {column}" if column else where, what, expected, hint)
 
 
-class OwnRigGateSettings:
-    """When a log of a rig of the user's own is refused."""
-
-    fewest = 60  # rows that the log of a moving rig needs
-    fewest_still = 8  # readings per channel that a vessel's log needs
-    missing = 0.3  # share of readings of a needed column that may be missing
-    vacuum = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
-    unmoved = 3.0  # a position with less travel than so many of its steps rests
+FEWEST = 60  # rows that the log of a moving rig needs
+FEWEST_STILL = 8  # readings per channel that a vessel's log needs
+MISSING = 0.3  # share of readings of a needed column that may be missing
+VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
+UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
 class BadData(ConfigErrors):
@@ -311,24 +308,24 @@ def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
 
 
 def _rig_time(log: Trajectory) -> Iterator[KembaError]:
-    limits, vessel = OwnRigGateSettings, log.meta["kind"] == "vessel"
-    yield from _clock(log, limits.fewest_still if vessel else limits.fewest)
+    vessel = log.meta["kind"] == "vessel"
+    yield from _clock(log, FEWEST_STILL if vessel else FEWEST)
 
 
 def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
-    limits, vessel = OwnRigGateSettings, log.meta["kind"] == "vessel"
+    vessel = log.meta["kind"] == "vessel"
     for name in log.meta.get("logged", {}):
         if name not in log:
             continue
         y = log[name]
         good = np.isfinite(y)
-        if vessel and good.sum() < limits.fewest_still:
+        if vessel and good.sum() < FEWEST_STILL:
             what = f"has {int(good.sum())} readings"
-            yield log_fault(log, what, f"at least {limits.fewest_still} were expected", column=name)
-        elif not vessel and 1.0 - good.mean() > limits.missing:
+            yield log_fault(log, what, f"at least {FEWEST_STILL} were expected", column=name)
+        elif not vessel and 1.0 - good.mean() > MISSING:
             what = f"{100 * (1.0 - good.mean()):.0f} % of its readings are missing"
             yield log_fault(log, what, column=name, row=int(np.argmin(good)))
-        elif name.endswith("/P") and np.median(y[good]) < limits.vacuum:
+        elif name.endswith("/P") and np.median(y[good]) < VACUUM:
             what = f"reads {np.median(y[good]):.4g} Pa, less than any air pressure"
             hint = "is it in bar or kPa, or above the atmosphere? Convert it with --map"
             yield log_fault(log, what, "pascals, absolute, were expected", hint, column=name)
@@ -343,5 +340,5 @@ def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
         if not len(steps):
             hint = "is the sensor dead, or the rig at rest?"
             yield log_fault(log, "never changes", "a log of a rig that works", hint, 0, name)
-        elif name.endswith(("/x", "/q")) and np.ptp(y) < OwnRigGateSettings.unmoved * (steps.min()):
+        elif name.endswith(("/x", "/q")) and np.ptp(y) < UNMOVED * (steps.min()):
             yield log_fault(log, "hardly moves", "a log with motion was expected", column=name)

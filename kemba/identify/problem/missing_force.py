@@ -14,14 +14,11 @@ from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.identify.problem.types import Array, MissingForce
 
-
-class BenchMissingSettings:
-    """The missing force of a bench log."""
-
-    memory = 0.025  # correlation time of the missing force [s]
-    rounds = 20  # rounds in which its strength is learnt
-    begin = 5.0  # strength (1 sigma) with which learning begins [N]
-    negligible = 0.05  # strength that is as good as none [N]
+# The missing force of a bench log.
+MEMORY = 0.025  # correlation time of the missing force [s]
+ROUNDS = 20  # rounds in which its strength is learnt
+BEGIN = 5.0  # strength (1 sigma) with which learning begins [N]
+NEGLIGIBLE = 0.05  # strength that is as good as none [N]
 
 
 def lagged(
@@ -32,16 +29,15 @@ def lagged(
     `time` (n,) [s]; `gap` (n,): the lag plus white noise of `variance` (n,). The strength (1 sigma
     of the lag) is learnt unless it is `known`.
     """
-    settings = BenchMissingSettings
-    keep = np.exp(-np.diff(time) / settings.memory)
-    strength = known or settings.begin
-    for _ in range(1 if known else settings.rounds):
+    keep = np.exp(-np.diff(time) / MEMORY)
+    strength = known or BEGIN
+    for _ in range(1 if known else ROUNDS):
         used = strength
         bands = _precision(keep, strength)
         bands[1] += 1.0 / variance
         mean = solveh_banded(bands, gap / variance)
         spread = _inverse_diagonal(bands)
-        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), settings.negligible)
+        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), NEGLIGIBLE)
     return np.asarray(mean), np.sqrt(spread), used
 
 
@@ -106,10 +102,7 @@ def spans(time: Array, flags: Array) -> tuple[tuple[float, float], ...]:
     )
 
 
-class ForceTermSettings:
-    """Constants of the force terms that are tried on rods."""
-
-    ranges = (0.003, 0.005, 0.008, 0.013, 0.02)  # reach of a force at an end of the stroke [m]
+RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # reach of a force at an end of the stroke [m]
 
 
 def end_terms(x: Array, stroke: float) -> Iterator[tuple[str, Array]]:
@@ -117,7 +110,7 @@ def end_terms(x: Array, stroke: float) -> Iterator[tuple[str, Array]]:
 
     `x` (...) [m]: position of the piston; `stroke` [m].
     """
-    for d in ForceTermSettings.ranges:
+    for d in RANGES:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
 

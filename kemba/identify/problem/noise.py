@@ -18,22 +18,19 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from kemba.identify.problem.sensor_noise import ColourSettings
 from kemba.identify.problem.types import Array, Flags, Labels, Rows
 
-
-class QuantisationSettings:
-    """How the step of a sensor is found."""
-
-    # readings closer than this share of their range are one reading: conversion of units rounds in
-    # the fifteenth digit, files have six or more
-    same = 1e-6
-    # readings come in steps where most differences of neighbours are whole steps: of what moves
-    # without a rest, the smallest difference is its slowest motion
-    near = 0.15  # distance from a whole number of steps that rounding in a file makes
-    few = 5.5  # differences of more steps tell nothing, since the error of the step adds up
-    most = 0.6  # share of differences that are whole steps; by chance 0.3 are
-    # steps of so many sigmas of the noise are coarse: below it, noise makes rounding errors
-    # independent (Widrow and Kollar 2008)
-    coarse = 2.0
-    longest = 1000  # rows at rest that count as one reading; of a longer rest more count
+# How the step of a sensor is found.
+# readings closer than this share of their range are one reading: conversion of units rounds in
+# the fifteenth digit, files have six or more
+SAME = 1e-6
+# readings come in steps where most differences of neighbours are whole steps: of what moves
+# without a rest, the smallest difference is its slowest motion
+NEAR = 0.15  # distance from a whole number of steps that rounding in a file makes
+FEW = 5.5  # differences of more steps tell nothing, since the error of the step adds up
+MOST = 0.6  # share of differences that are whole steps; by chance 0.3 are
+# steps of so many sigmas of the noise are coarse: below it, noise makes rounding errors
+# independent (Widrow and Kollar 2008)
+COARSE = 2.0
+LONGEST = 1000  # rows at rest that count as one reading; of a longer rest more count
 
 
 def step_of(values: Array) -> float:
@@ -42,17 +39,17 @@ def step_of(values: Array) -> float:
     steps = np.diff(known)
     if not len(steps):
         return 0.0
-    steps = steps[steps > QuantisationSettings.same * np.ptp(known)]
+    steps = steps[steps > SAME * np.ptp(known)]
     counts = steps / steps.min()
-    counts = counts[counts < QuantisationSettings.few]
-    whole = np.abs(counts - np.round(counts)) < QuantisationSettings.near
-    return float(steps.min()) if np.mean(whole) > QuantisationSettings.most else 0.0
+    counts = counts[counts < FEW]
+    whole = np.abs(counts - np.round(counts)) < NEAR
+    return float(steps.min()) if np.mean(whole) > MOST else 0.0
 
 
 def is_coarse(step: float, sigma: float) -> bool:
     """Whether a sensor's step is so much larger than its noise that rounding errors depend on each
     other."""
-    return step > QuantisationSettings.coarse * sigma
+    return step > COARSE * sigma
 
 
 def telling(values: Array, sigma: float) -> Flags:
@@ -78,7 +75,7 @@ def telling(values: Array, sigma: float) -> Flags:
 
 def _still(level: Labels) -> int:
     """How many of the first readings (n,), counted in steps, keep to one level or to two."""
-    level = level[: QuantisationSettings.longest]
+    level = level[:LONGEST]
     low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
     moved = high - low > 1
     return int(np.argmax(moved)) if moved.any() else len(moved)
@@ -134,19 +131,17 @@ class DriftNoise:
         return -0.5 * float(np.sum(np.log1p(self.variance)))
 
 
-class NoiseSettings:
-    """How the colour of the noise is learnt."""
-
-    order = 4  # largest order of the autoregression: BIC chooses among 0 to this
-    fewest = 50  # rows below which no colour is learnt
-    # smallest noise that is believed, as a share of the sensor's white noise; a flexible model fits
-    # some of the noise
-    least = 0.6
-    trim = 5.0  # residuals beyond so many sigma are clipped: they are switching instants
-    softest = 0.2  # smallest sigma that the clipping assumes
-    spike = 7  # rows that a spike lasts
-    around = 151  # rows around a spike that it is compared with
-    spiky = 5.0  # ratio of mean squares that makes a spike
+# How the colour of the noise is learnt.
+ORDER = 4  # largest order of the autoregression: BIC chooses among 0 to this
+FEWEST = 50  # rows below which no colour is learnt
+# smallest noise that is believed, as a share of the sensor's white noise; a flexible model fits
+# some of the noise
+LEAST = 0.6
+TRIM = 5.0  # residuals beyond so many sigma are clipped: they are switching instants
+SOFTEST = 0.2  # smallest sigma that the clipping assumes
+SPIKE = 7  # rows that a spike lasts
+AROUND = 151  # rows around a spike that it is compared with
+SPIKY = 5.0  # ratio of mean squares that makes a spike
 
 
 class WhiteNoiseSettings:
@@ -230,7 +225,7 @@ def learn(residual: Array, order: int | None = None, careful: bool = False) -> C
 
     `careful`: spikes get less weight from now on.
     """
-    order = NoiseSettings.order if order is None else order
+    order = ORDER if order is None else order
     weight = caution(residual) if careful else None
     found = _yule_walker(residual if weight is None else residual * weight, order)
     return replace(found, rows=len(residual), weight=weight)
@@ -245,12 +240,11 @@ def _beside_drift(residual: Array, time: Array, careful: bool) -> Colour:
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:
-    settings = NoiseSettings
-    scale = max(1.4826 * float(np.median(np.abs(residual))), settings.softest)
-    r = np.clip(residual, -settings.trim * scale, settings.trim * scale)
+    scale = max(1.4826 * float(np.median(np.abs(residual))), SOFTEST)
+    r = np.clip(residual, -TRIM * scale, TRIM * scale)
     n = len(r)
-    if n < settings.fewest:
-        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), settings.least))
+    if n < FEWEST:
+        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), LEAST))
     c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
     best, chosen = np.inf, (np.zeros(0), float(c[0]))
     for p in range(order + 1):
@@ -259,7 +253,7 @@ def _yule_walker(residual: Array, order: int) -> Colour:
         bic = n * np.log(power) + p * np.log(n)
         if bic < best - 1e-9:
             best, chosen = bic, (phi, power)
-    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), settings.least))
+    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), LEAST))
 
 
 def caution(residual: Array) -> Array:
@@ -268,10 +262,10 @@ def caution(residual: Array) -> Array:
     At switching instants and reversals the imposed motion is known worst. An error that lasts is
     left alone: it may be physics.
     """
-    settings, power = NoiseSettings, residual**2
-    near, around = (uniform_filter1d(power, rows) for rows in (settings.spike, settings.around))
-    spike = near > settings.spiky * np.maximum(around, 1.0)
-    spike = maximum_filter1d(spike, settings.spike)
+    power = residual**2
+    near, around = (uniform_filter1d(power, rows) for rows in (SPIKE, AROUND))
+    spike = near > SPIKY * np.maximum(around, 1.0)
+    spike = maximum_filter1d(spike, SPIKE)
     return np.where(spike, 1.0 / np.sqrt(np.maximum(near, 1.0)), 1.0)
 
 

@@ -39,16 +39,13 @@ FREE_THEN = ("supply_scale", "rise_time_scale")
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
 
 
-class StructureSettings:
-    """How far the figures of orifice chambers may be from the usual ones: 1 sigma of their
-    logarithm."""
-
-    area = 0.2  # of an orifice's area
-    volume = 0.3  # of a dead volume
-    # of the pressure that reaches the valves: the size of `supply_scale`, which it stands for
-    level = 0.1
-    reach = 4.0  # largest error of a figure, in these sigmas
-    exponent = 0.08  # of the polytropic exponent
+# How far the figures of orifice chambers may be from the usual ones: 1 sigma of their.
+AREA = 0.2  # of an orifice's area
+VOLUME = 0.3  # of a dead volume
+# of the pressure that reaches the valves: the size of `supply_scale`, which it stands for
+STRUCTURE_LEVEL = 0.1
+REACH = 4.0  # largest error of a figure, in these sigmas
+EXPONENT = 0.08  # of the polytropic exponent
 
 
 class OrificeShare(OrificeChamber):
@@ -107,7 +104,7 @@ def structure_candidates(model: Model) -> dict[str, Candidate]:
     shapes = []
     for name, width in _widths().items():
         param, usual = declared[name], float(share.value(name))
-        reach = math.exp(StructureSettings.reach * width)
+        reach = math.exp(REACH * width)
         low, high = max(param.lower, usual / reach), min(param.upper, usual * reach)
         shapes.append(Parameter(name, param.unit, usual, width, low, high, usual))
     lead = Parameter("a", "1", 0.0, 1.0, 0.0, 1.0)
@@ -116,9 +113,9 @@ def structure_candidates(model: Model) -> dict[str, Candidate]:
 
 def _widths() -> dict[str, float]:
     """1 sigma of each figure's logarithm."""
-    areas = dict.fromkeys(("a_fill", "a_vent"), StructureSettings.area)
-    volumes = dict.fromkeys(("V_e", "V_r"), StructureSettings.volume)
-    return {**areas, **volumes, "level": StructureSettings.level, "n": StructureSettings.exponent}
+    areas = dict.fromkeys(("a_fill", "a_vent"), AREA)
+    volumes = dict.fromkeys(("V_e", "V_r"), VOLUME)
+    return {**areas, **volumes, "level": STRUCTURE_LEVEL, "n": EXPONENT}
 
 
 def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
@@ -147,14 +144,12 @@ def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:
 LINE = "supply_line"
 
 
-class LineSettings:
-    """Where the supply line's figures are looked for."""
-
-    none = 1e3  # reciprocal of an orifice that is none [m-2]: 200 times a valve's area
-    size = 1.5e5  # reciprocal that is neither small nor large [m-2]
-    largest = 1e6  # largest reciprocal: an orifice of 1 mm2 [m-2]
-    volume = 0.7  # prior width of the logarithm of the volume: a factor of two
-    reach = 30.0  # a volume is looked for within this factor
+# Where the supply line's figures are looked for.
+NONE = 1e3  # reciprocal of an orifice that is none [m-2]: 200 times a valve's area
+SIZE = 1.5e5  # reciprocal that is neither small nor large [m-2]
+LARGEST = 1e6  # largest reciprocal: an orifice of 1 mm2 [m-2]
+LINE_VOLUME = 0.7  # prior width of the logarithm of the volume: a factor of two
+LINE_REACH = 30.0  # a volume is looked for within this factor
 
 
 class LineResistance(SupplyLine):
@@ -166,7 +161,7 @@ class LineResistance(SupplyLine):
     nominal: ClassVar[dict[str, Tolerance]] = {}
 
     def evaluate(self, at: At) -> Contribution:
-        area = 1.0 / (self.r + LineSettings.none)
+        area = 1.0 / (self.r + NONE)
         return SupplyLine.evaluate(self.bind({"a": area}), at)  # type: ignore[arg-type]
 
 
@@ -175,8 +170,8 @@ def line_candidates(model: Model) -> dict[str, Candidate]:
     drawing = any("draw_e" in effect.publishes for effect in model.effects)
     if not drawing or any(effect.kind == LINE for effect in model.effects):
         return {}
-    settings, volume = LineSettings, float(SupplyLine().V)
-    lead = Parameter("r", "m-2", 0.0, settings.size, 0.0, settings.largest)
-    ends = (volume / settings.reach, volume * settings.reach)
-    hose = Parameter("V", "m3", volume, settings.volume, *ends, volume)
+    volume = float(SupplyLine().V)
+    lead = Parameter("r", "m-2", 0.0, SIZE, 0.0, LARGEST)
+    ends = (volume / LINE_REACH, volume * LINE_REACH)
+    hose = Parameter("V", "m3", volume, LINE_VOLUME, *ends, volume)
     return {LINE: Candidate(LINE, lead, (hose,), reciprocal={"r": ("a", "m2")})}

@@ -31,13 +31,9 @@ from kemba.model import load_model
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class RigFitSettings:
-    """How the figures of a rig are fitted."""
-
-    loose = 10.0  # prior sigma of a factor that is fitted: as good as none
-    step = 1e-4  # step of finite differences of a factor
-    flat = 1e-5  # smallest pivot of a fit whose figures can be told apart
+LOOSE = 10.0  # prior sigma of a factor that is fitted: as good as none
+STEP = 1e-4  # step of finite differences of a factor
+FLAT = 1e-5  # smallest pivot of a fit whose figures can be told apart
 
 
 @dataclass(frozen=True)
@@ -92,7 +88,7 @@ def fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
     without a value start at their usual size. Raises KembaError where logs cannot tell them apart.
     """
-    loose = RigFitSettings.loose
+    loose = LOOSE
     started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
     names = [
         name
@@ -119,7 +115,6 @@ def _started(effect: Effect) -> Effect:
 def _fit(
     problem: Problem, names: list[str], values: Mapping[str, float], model: Model, before: float
 ) -> RigFit:
-    settings = RigFitSettings
     starts = [n for n in problem.nuisance if n.startswith("start:")]
     free = [*names, *starts]
     centre = np.array([problem.nuisance[n][0] for n in free])
@@ -136,14 +131,14 @@ def _fit(
         np.zeros(len(free)),
         bounds=(lower, upper),
         x_scale="jac",
-        diff_step=settings.step,
+        diff_step=STEP,
         method="trf",
     )
     rows = len(problem.rows())
     j, r = found.jac[:rows], found.fun[:rows]
     scale = np.maximum(np.linalg.norm(j, axis=0), 1e-300)
     pivots = np.abs(np.diag(np.linalg.qr(j / scale, mode="r")))
-    if pivots.min() < settings.flat:
+    if pivots.min() < FLAT:
         worst = free[int(np.argmin(pivots))]
         hint = "fix one of them: leave it out of the model, or log another motion"
         raise KembaError(worst, "cannot be told from the other figures by these logs", hint=hint)

@@ -17,11 +17,7 @@ from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.rest import Rest, rate_of
 
-
-class BalanceSettings:
-    """Integration of the states that effects have, along a log."""
-
-    chunk = 1000  # steps per call of a compiled function
+CHUNK = 1000  # steps per call of a compiled function
 
 
 class Balance:
@@ -53,7 +49,7 @@ class Balance:
             at = [given[1], given[2], given[3], given[4:], node.p]
             after, _ = midpoint_step(rate, node.s, symbols[1:], at, given[0])
             step = ca.Function("step", [node.s, given, node.p], [ca.densify(after)])
-            self._chunk = BalanceSettings.chunk
+            self._chunk = CHUNK
             self._step = step.mapaccum(self._chunk)
 
     def force(self, log: Filtered, values: Mapping[str, float]) -> Array:
@@ -110,16 +106,10 @@ class Balance:
 SEALS = "measured_chambers.travel"
 
 
-class SealSettings:
-    """How well it is known how far seals stretch."""
-
-    travel = 0.5  # prior sigma of the travel until they slide, as a share of it
+TRAVEL = 0.5  # prior sigma of the travel until they slide, as a share of it
 
 
-class GainSettings:
-    """What a motor's scale may be."""
-
-    least = 0.05  # smallest force of a motor over that of the log
+LEAST = 0.05  # smallest force of a motor over that of the log
 
 
 class Predictor:
@@ -134,7 +124,7 @@ class Predictor:
         self.place, self.answer = PLACE[rig], ANSWER[rig]
         self.figures = nominal_figures(model)
         if rig == "cylinder":
-            self.figures[SEALS] = (1.0, SealSettings.travel)
+            self.figures[SEALS] = (1.0, TRAVEL)
         self.sensors = SensorFaults(model.effects)
         self._known: dict[tuple[str, ...], Balance] = {}
 
@@ -162,7 +152,7 @@ class Predictor:
         """Force of the motor over the force that the log says."""
         listed = self.model.parameters.get("axis_scale.k")  # which theta scales, if there is one
         gain = theta.get("axis_scale.k", 1.0) * (listed[1] if listed else 1.0)
-        return max(gain, GainSettings.least)
+        return max(gain, LEAST)
 
     def variance(self, log: RigLog, usual: float) -> Array:
         """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -27,13 +27,9 @@ from kemba.identify.rigs.rig_log import RigLog, prepare
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class RigProblemSettings:
-    """How well the sensors of a rig are known."""
-
-    # prior sigma of the zero of a pressure sensor [Pa]: the pressure of the air changes by 1 kPa (1
-    # sigma) with the weather
-    weather = 1e3
+# prior sigma of the zero of a pressure sensor [Pa]: the pressure of the air changes by 1 kPa (1
+# sigma) with the weather
+WEATHER = 1e3
 
 
 class RigProblem(Problem):
@@ -56,7 +52,7 @@ class RigProblem(Problem):
         self.predictor = predictor
         predictor.candidates = self.candidates
         self.nuisance = predictor.figures | predictor.sensors.nuisance
-        zero = RigProblemSettings.weather
+        zero = WEATHER
         for name in model.mechanism.logged:
             key = f"sensor_bias:{name}"
             if name.endswith("/P") and key not in predictor.sensors.listed:
@@ -75,17 +71,17 @@ class RigProblem(Problem):
         """Unit of that channel."""
         return self.model.mechanism.logged[self.answer]
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         parts = []
-        for i in self._all(runs):
+        for i in range(len(self.logs)):
             with np.errstate(over="ignore"):  # a fit may try what nothing is predicted at
                 r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
             parts.append(whiten(r, self.colour[i]) if i in self.colour else r)
         return np.concatenate(parts)
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         still, parts = self.model.mechanism.sign_speed, []
-        for i in self._all(runs):
+        for i in range(len(self.logs)):
             log = self.logs[i]
             n, v = len(log.time), log.speed
             phase = np.where(np.abs(v) < still, "rest", np.where(v > 0, "forward", "back"))
@@ -197,9 +193,6 @@ class RigProblem(Problem):
         """Position (n,) of every row, and whether it moves forward (n,)."""
         place, speed, _ = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
         return place, speed > 0.0
-
-    def _all(self, runs: Collection[int] | None) -> Collection[int]:
-        return range(len(self.logs)) if runs is None else runs
 
     def _seen(self) -> list[tuple[Array, Array, Array]]:
         """Position, rate and measured force (k,) of every run."""

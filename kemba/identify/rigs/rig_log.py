@@ -26,18 +26,16 @@ from kemba.trajectory import Trajectory
 GAIN = (0.5311, 0.3756, 0.4600)
 
 
-class RigFilterSettings:
-    """How the channels of a rig's log are filtered."""
-
-    widths = (3, 4, 6, 8, 12, 16, 24, 32)  # widths (1 sigma) in samples that are tried
-    # noise of the rate that is small enough, as a share of `sign_speed`: the sign of a rate is then
-    # certain
-    creep = 0.2
-    # noise of the inertia's force that is small enough, as a share of the force's spread
-    weight = 0.01
-    reach = 4.0  # widths beyond which the Gaussian is cut off: 6e-5 of it is lost
-    gap = 5.0  # rows farther apart than so many usual steps are a gap
-    finest = 5e-4  # smallest noise, as a share of a channel's range
+# How the channels of a rig's log are filtered.
+WIDTHS = (3, 4, 6, 8, 12, 16, 24, 32)  # widths (1 sigma) in samples that are tried
+# noise of the rate that is small enough, as a share of `sign_speed`: the sign of a rate is then
+# certain
+CREEP = 0.2
+# noise of the inertia's force that is small enough, as a share of the force's spread
+WEIGHT = 0.01
+REACH = 4.0  # widths beyond which the Gaussian is cut off: 6e-5 of it is lost
+GAP = 5.0  # rows farther apart than so many usual steps are a gap
+FINEST = 5e-4  # smallest noise, as a share of a channel's range
 
 
 @dataclass(frozen=True)
@@ -87,25 +85,25 @@ def filtered(
     (1 sigma) by name, "" for the position, which a sensor reads anew after each `turn`. Rows with a
     missing reading are left out.
     """
-    settings, known = RigFilterSettings, known or {}
+    known = known or {}
     good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
     time, position = time[good], position[good]
     others = {name: y[good] for name, y in others.items()}
     step = float(np.median(np.diff(time)))
-    finest = settings.finest * min(float(np.ptp(position)), turn) / 50
+    finest = FINEST * min(float(np.ptp(position)), turn) / 50
     noise = known.get("", max(difference_sigma(position), finest))
     force = max((float(np.std(y)) for y in others.values()), default=1.0)
     width = next(
-        (s for s in settings.widths
-         if _rate_noise(noise, step, s) <= settings.creep * creep
-         and heavy * _bend_noise(noise, step, s) <= settings.weight * force),
-        settings.widths[-1],
+        (s for s in WIDTHS
+         if _rate_noise(noise, step, s) <= CREEP * creep
+         and heavy * _bend_noise(noise, step, s) <= WEIGHT * force),
+        WIDTHS[-1],
     )  # fmt: skip
     names = list(others)
     parts, begins, rows, count = [], [], [], 0
-    for first, last in _stretches(time, settings.gap * step):
+    for first, last in _stretches(time, GAP * step):
         n = int((time[last] - time[first]) / step) + 1
-        if n < 2 * settings.reach * width + 3:
+        if n < 2 * REACH * width + 3:
             continue
         grid = time[first] + step * np.arange(n)
         columns = [np.interp(grid, time, y) for y in (position, *others.values())]
@@ -113,7 +111,7 @@ def filtered(
         v = np.gradient(smooth[0], step)
         parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), columns[0], *smooth[1:]]))
         begins.append(count)
-        edge = int(settings.reach * width) + 2
+        edge = int(REACH * width) + 2
         rows.append(count + np.arange(edge, n - edge, width))
         count += n
     if not parts:
@@ -121,7 +119,7 @@ def filtered(
     table = np.concatenate(parts, axis=1)
     sigma = {
         name: GAIN[0] / np.sqrt(width)
-        * known.get(name, max(difference_sigma(y), settings.finest * float(np.ptp(y))))
+        * known.get(name, max(difference_sigma(y), FINEST * float(np.ptp(y))))
         for name, y in others.items()
     }  # fmt: skip
     return Filtered(
@@ -142,7 +140,7 @@ def filtered(
 
 
 def _smooth(values: Array, width: float) -> Array:
-    reach = RigFilterSettings.reach
+    reach = REACH
     return np.asarray(gaussian_filter1d(values, width, truncate=reach, mode="nearest"))
 
 
@@ -175,15 +173,13 @@ ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
 PLACE = {"cylinder": "piston/x", "drive": "axis/q"}
 
 
-class RigLogSettings:
-    """Which rows of a rig's log a friction is known in."""
-
-    # travel after a turn within which friction is in doubt, over that in which seals stretch: that
-    # travel is taken to be known to a factor of two
-    doubted = 2.0
-    # time around a turn that the filter mixes into a row, over the filter's width: three sigmas of
-    # the Gaussian
-    blurred = 3.0
+# Which rows of a rig's log a friction is known in.
+# travel after a turn within which friction is in doubt, over that in which seals stretch: that
+# travel is taken to be known to a factor of two
+DOUBTED = 2.0
+# time around a turn that the filter mixes into a row, over the filter's width: three sigmas of
+# the Gaussian
+BLURRED = 3.0
 
 
 @dataclass(frozen=True)
@@ -228,9 +224,9 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     doubt = 0.5 * (high - low)
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
-        settings, step = RigLogSettings, float(np.median(np.diff(found.time)))
-        held = 1.0 - np.abs(_stretch(found, settings.doubted * travel))
-        reach = 2 * int(np.ceil(settings.blurred * found.width / step)) + 1
+        step = float(np.median(np.diff(found.time)))
+        held = 1.0 - np.abs(_stretch(found, DOUBTED * travel))
+        reach = 2 * int(np.ceil(BLURRED * found.width / step)) + 1
         doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])
     return RigLog(name, found, doubt)
 

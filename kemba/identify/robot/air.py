@@ -96,11 +96,8 @@ def _at(time: Array, values: Array, times: Array) -> Array:
     return np.asarray(values[right - 1] + share * (values[right] - values[right - 1]))
 
 
-class ForcesSettings:
-    """What is kept of computed forces."""
-
-    kept = 4  # inputs and states that are kept beside the first ones
-    lines = 50_000_000  # bytes of forces that are kept: the next Jacobian asks for them
+KEPT = 4  # inputs and states that are kept beside the first ones
+LINES = 50_000_000  # bytes of forces that are kept: the next Jacobian asks for them
 
 
 @dataclass
@@ -136,7 +133,7 @@ class Forces:
         for (None: all)."""
         key = delays.tobytes() + p[self.physics.moves].tobytes() + bytes([among is None])
         if key not in self._states:
-            kept = ForcesSettings.kept
+            kept = KEPT
             given = self._inputs.get(delays.tobytes())
             if given is None:
                 given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
@@ -151,8 +148,7 @@ class Forces:
         line = self._lines.get(key)
         if line is None:
             line = ForceLine(p.copy(), self._exact(p, delays))
-            settings = ForcesSettings
-            _keep(self._lines, key, line, max(settings.kept, settings.lines // line.force.nbytes))
+            _keep(self._lines, key, line, max(KEPT, LINES // line.force.nbytes))
         moved = np.flatnonzero(p != line.p)
         if crossed[np.ix_(moved, moved)].any():
             return self._exact(p, delays)

@@ -19,14 +19,10 @@ from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
 from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
-
-class ResamplingSettings:
-    """Nodes of robot logs."""
-
-    shortest = 0.7e-3  # denser rows are averaged [s]
-    longest = 1.6e-3  # nodes farther apart are filled [s]
-    # smallest noise of a channel, in m or rad: far below what position sensors resolve
-    finest = 1e-6
+SHORTEST = 0.7e-3  # denser rows are averaged [s]
+LONGEST = 1.6e-3  # nodes farther apart are filled [s]
+# smallest noise of a channel, in m or rad: far below what position sensors resolve
+FINEST = 1e-6
 
 
 @dataclass(frozen=True)
@@ -90,7 +86,7 @@ def _sigma(log: Trajectory, channel: str, values: Array) -> float:
         return stated
     if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
         return CHANNELS[channel.split("/")[-1]][1]
-    return max(difference_sigma(values), ResamplingSettings.finest)
+    return max(difference_sigma(values), FINEST)
 
 
 def _stated(log: Trajectory, channel: str) -> float | None:
@@ -105,7 +101,7 @@ def _stated(log: Trajectory, channel: str) -> float | None:
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
     """Averages of so many rows that nodes are at least `shortest` apart."""
     count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
-    if np.median(np.diff(time)) >= ResamplingSettings.shortest or count == 1:
+    if np.median(np.diff(time)) >= SHORTEST or count == 1:
         return time, raw, torque, 1
     n = len(time) // count * count
     with np.errstate(invalid="ignore"):
@@ -117,7 +113,7 @@ def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, 
 
 def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:
     """Nodes without measurement where rows are far apart."""
-    pieces = np.maximum(1, np.ceil(np.diff(time) / ResamplingSettings.longest)).astype(int)
+    pieces = np.maximum(1, np.ceil(np.diff(time) / LONGEST)).astype(int)
     if (pieces == 1).all():
         return time, raw, torque
     start = np.repeat(np.arange(len(pieces)), pieces)

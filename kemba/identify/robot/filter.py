@@ -9,15 +9,11 @@ import numpy as np
 
 from kemba.identify.problem.types import Array
 
-
-class FilterSettings:
-    """Numbers of the filter."""
-
-    # variance of a row that was not measured, over the largest variance: such a row tells nothing
-    missing = 1e12
-    # columns that pass at once: with all, the memory of `compare` is a quarter more: time of
-    # compare on five logs of 1 s; the same at 32, 7 % longer at 8
-    columns = 16
+# variance of a row that was not measured, over the largest variance: such a row tells nothing
+MISSING = 1e12
+# columns that pass at once: with all, the memory of `compare` is a quarter more: time of
+# compare on five logs of 1 s; the same at 32, 7 % longer at 8
+COLUMNS = 16
 
 
 @dataclass(frozen=True)
@@ -54,7 +50,7 @@ def gains(system: System) -> FilterGains:
     s = system
     n, runs, m, d = s.H.shape
     known = np.isfinite(s.R)
-    R = np.where(known, s.R, FilterSettings.missing * np.nanmax(np.where(known, s.R, 0.0)))
+    R = np.where(known, s.R, MISSING * np.nanmax(np.where(known, s.R, 0.0)))
     turn, P_all = np.empty_like(s.F), np.empty_like(s.F)
     carry, whitener = np.empty((n, runs, d, m)), np.empty((n, runs, m, m))
     P, diagonal = s.P0.copy(), np.arange(m)
@@ -86,7 +82,7 @@ def innovations(system: System, gain: FilterGains, y: Array | None, g: Array | N
 
 def at_once(count: int) -> Iterator[slice]:
     """The parts of so many columns that pass the filter at once."""
-    size = FilterSettings.columns
+    size = COLUMNS
     return (slice(i, i + size) for i in range(0, count, size))
 
 

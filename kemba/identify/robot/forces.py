@@ -23,12 +23,10 @@ from kemba.identify.robot.state import LinearisedState
 BODY = {"body z": 1, "body x": 0}  # place among the channels
 
 
-class UsualForceSettings:
-    """A force of each channel that is neither small nor large."""
-
-    body = 3.0  # on the body [N]
-    hip = 0.5  # at a hip [N.m]
-    rod = 10.0  # on a rod [N]: friction of 6 to 8 N by the paper's tables
+# A force of each channel that is neither small nor large.
+USUAL_FORCE_BODY = 3.0  # on the body [N]
+HIP = 0.5  # at a hip [N.m]
+ROD = 10.0  # on a rod [N]: friction of 6 to 8 N by the paper's tables
 
 
 def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
@@ -39,14 +37,15 @@ def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
     flying = [(s.phase == "flight").astype(float) for s in state.schedules]
     where = state.batch.pad(flying, 0.0)[..., None] > 0.5
     y, rate = state.motion.y, state.motion.rate
-    usual = UsualForceSettings
     found = [_rods(state), _hips(state, where)]
     for name, k in BODY.items():
         quantities = {
             "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
             "position [m]": np.where(where, y[..., [k]], np.nan),
         }
-        found.append(ForceChannel(name, "N", usual.body, quantities, force_columns(state, [k])))
+        found.append(
+            ForceChannel(name, "N", USUAL_FORCE_BODY, quantities, force_columns(state, [k]))
+        )
     return found
 
 
@@ -62,7 +61,7 @@ def _rods(state: LinearisedState) -> ForceChannel:
     return ForceChannel(
         "rods",
         "N",
-        UsualForceSettings.rod,
+        ROD,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
         force_columns(state, range(3 + legs, 3 + 2 * legs)),
         {side: _after(state, f"valve/{side}") for side in SIDES},
@@ -79,7 +78,7 @@ def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
     return ForceChannel(
         "hips",
         "N.m",
-        UsualForceSettings.hip,
+        HIP,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
         force_columns(state, legs),
         {"hip/tau": _after(state, "hip/tau")},
@@ -108,13 +107,11 @@ def force_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[
     return columns
 
 
-class RobotFormulaSettings:
-    """Constants of the simple force terms that are tried on robots."""
-
-    speed = 0.1  # speed over which friction at a hip turns round [rad.s-1]
-    creeps = (0.003, 0.006, 0.012)  # travel over which a hysteresis turns round [m]
-    ripples = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of the hip
-    ropes = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
+# Constants of the simple force terms that are tried on robots.
+SPEED = 0.1  # speed over which friction at a hip turns round [rad.s-1]
+CREEPS = (0.003, 0.006, 0.012)  # travel over which a hysteresis turns round [m]
+RIPPLES = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of the hip
+ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
 
 
 def formula_columns(state: LinearisedState) -> dict[str, Array]:
@@ -147,7 +144,7 @@ def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     yield "v**3", v**3
     yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
     yield f"tanh(v/{V_COULOMB:g})*x", sign * x
-    for travel in RobotFormulaSettings.creeps:
+    for travel in CREEPS:
         paths = x.reshape(len(x), -1).T
         turned = np.stack([dahl(path, travel) for path in paths], axis=1)
         yield f"dahl(x, {travel:g})", turned.reshape(x.shape)
@@ -155,11 +152,10 @@ def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
 
 def hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
     """(formula, torque at the hip (n, L, legs)) of angle, rate and the torque commanded."""
-    settings = RobotFormulaSettings
-    sign = np.tanh(w / settings.speed)
-    for n in settings.ripples:
+    sign = np.tanh(w / SPEED)
+    for n in RIPPLES:
         yield f"sin({n}*q)", np.sin(n * q)
-    yield f"abs(tau)*tanh(w/{settings.speed:g})", np.abs(torque) * sign
+    yield f"abs(tau)*tanh(w/{SPEED:g})", np.abs(torque) * sign
     yield "w*abs(w)", w * np.abs(w)
     yield "tau**3", torque**3
     yield "max(w, 0)", np.maximum(w, 0.0)
@@ -168,7 +164,7 @@ def hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
 def body_terms(name: str, at: Array, v: Array) -> Iterator[tuple[str, Array]]:
     """(formula, force on the body (n, L, 1)) along one axis."""
     yield from drag_terms(name, v)
-    for height in RobotFormulaSettings.ropes:
+    for height in ROPES:
         yield f"max({name} - {height:g}, 0)", np.maximum(at - height, 0.0)
 
 

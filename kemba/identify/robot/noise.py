@@ -82,12 +82,9 @@ def simulated(system: System, draws: int, rng: np.random.Generator) -> Array:
     return np.asarray(y)
 
 
-class ExpectedSettings:
-    """Expected power of the residuals, by simulation."""
-
-    draws = 6  # simulated logs
-    width = 21  # nodes over which the power is averaged; odd
-    least = 0.02  # smallest power
+DRAWS = 6  # simulated logs
+WIDTH = 21  # nodes over which the power is averaged; odd
+LEAST = 0.02  # smallest power
 
 
 def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
@@ -96,15 +93,14 @@ def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
     It is below 1 where the filter allows for contact forces that a steady stance does not need.
     The draws are few, so that their power is averaged over some nodes.
     """
-    settings = ExpectedSettings
     rng = np.random.default_rng(seed)
-    y = simulated(system, settings.draws, rng)
+    y = simulated(system, DRAWS, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
-    width = settings.width
+    width = WIDTH
     padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
     total = np.cumsum(padded, axis=0)
     total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
-    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, settings.least))
+    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, LEAST))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:

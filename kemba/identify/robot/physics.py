@@ -105,11 +105,8 @@ class StateRunner:
 FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
 
 
-class FigureSettings:
-    """Figures of another structure that are free."""
-
-    reach = 4.0  # largest error, in sigmas: beyond chance
-    least = 0.2  # smallest value, as a share of the nominal one
+REACH = 4.0  # largest error, in sigmas: beyond chance
+LEAST = 0.2  # smallest value, as a share of the nominal one
 
 
 class Physics:
@@ -160,12 +157,11 @@ class Physics:
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
         may not leave: a negative area has no flow."""
-        settings = FigureSettings
         lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
         for name, (value, sigma) in figures.items():
-            i, reach = self.names.index(name), settings.reach * sigma
+            i, reach = self.names.index(name), REACH * sigma
             declared = self.base.parameters[name][0] if name in self.base.parameters else None
-            lower[i] = max(value - reach, settings.least * value)
+            lower[i] = max(value - reach, LEAST * value)
             upper[i] = min(value + reach, declared.upper if declared else np.inf)
         return lower, upper
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.effects.pneumatics.switching import changes as switchings
-from kemba.identify.problem.types import Array, Changes, Flags, OperatingPoint, Rows, Texts
-from kemba.identify.robot.batch import Batch, ResampledLog
-from kemba.identify.robot.contact import ContactSchedule
+from kemba.identify.problem.types import Array, Changes, OperatingPoint, Rows, Texts
+from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import PlaceSettings
 from kemba.identify.robot.state import LinearisedState
@@ -25,24 +24,18 @@ def row_channels(physics: Physics) -> tuple[str, ...]:
     return (*physics.channels, *feet, *(f"{leg}/stop" for leg in physics.legs))
 
 
-def describe(
-    physics: Physics,
-    batch: Batch,
-    schedules: Sequence[ContactSchedule],
-    inputs: Array,
-    mask: Flags,
-    runs: Sequence[int],
-) -> Rows:
-    """Rows where `mask` (n, L, m) holds, run by run, channel by channel."""
+def describe(state: LinearisedState) -> Rows:
+    """Rows of the logs that are data, run by run, channel by channel."""
+    physics, batch, inputs = state.physics, state.batch, state.motion.states[1]
     channels = row_channels(physics)
     m = len(channels)
     found: dict[str, list[Texts]] = {}
-    for i in runs:
-        log, own = batch.resampled[i], mask[:, i].T
+    for i, log in enumerate(batch.resampled):
+        own = state.mask[:, i].T
         time = np.zeros(batch.n)
         time[: len(log.time)] = log.time
         phase = np.full(batch.n, "", dtype=object)
-        phase[: len(log.time)] = schedules[i].phase
+        phase[: len(log.time)] = state.schedules[i].phase
         sigma = np.append(log.sigma, [PlaceSettings.ground] * (m - len(log.sigma)))
         whole = {
             "run": np.full(own.shape, i),

@@ -12,24 +12,20 @@ from kemba.effects.series import Series
 from kemba.identify.problem.types import Array
 from kemba.identify.robot.batch import ResampledLog
 
-
-class SensingSettings:
-    """How late sensors read a motion."""
-
-    # nodes over which rates are smoothed before a delay reads them: noise in the rate makes delays
-    # look shorter, by as much as a half
-    calm = 2.0
-    # rows from which a late sensor's readings are moved to the rows to which they belong: calm
-    # rates tell 1 ms well and not 5 ms; of 618 blind cases one ranked a longer delay where none
-    # was, 1.53 ms
-    caught_up = 1.5
+# nodes over which rates are smoothed before a delay reads them: noise in the rate makes delays
+# look shorter, by as much as a half
+CALM = 2.0
+# rows from which a late sensor's readings are moved to the rows to which they belong: calm
+# rates tell 1 ms well and not 5 ms; of 618 blind cases one ranked a longer delay where none
+# was, 1.53 ms
+CAUGHT_UP = 1.5
 
 
 def whole_rows(late: Array, row: float) -> Array:
     """By how many whole rows of `row` [s] the readings of sensors that are `late` (m,) [s] are
     moved; by none where calm rates do."""
     rows = np.rint(late / row)
-    return np.where(np.abs(late) < SensingSettings.caught_up * row, 0.0, rows)
+    return np.where(np.abs(late) < CAUGHT_UP * row, 0.0, rows)
 
 
 def travelled(rate: Array, h: Array) -> Array:
@@ -38,7 +34,7 @@ def travelled(rate: Array, h: Array) -> Array:
     The rates are smoothed first. A delay multiplies them, and noise in a regressor makes its
     coefficient too small: delays would look shorter than they are, by as much as a half.
     """
-    calm: Array = gaussian_filter1d(rate, SensingSettings.calm, axis=0, mode="nearest")
+    calm: Array = gaussian_filter1d(rate, CALM, axis=0, mode="nearest")
     steps = 0.5 * (calm[1:] + calm[:-1]) * h[:-1, :, None]
     return np.concatenate([np.zeros_like(rate[:1]), np.cumsum(steps, axis=0)])
 

@@ -8,7 +8,7 @@ states are free; contact and stop forces are unknown where the data show contact
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -35,12 +35,8 @@ from kemba.identify.robot.reference import (
 )
 from kemba.identify.robot.sensing import ahead, sensed, whole_rows
 
-
-class StateSettings:
-    """How the motion of robot logs is found."""
-
-    rounds = 2  # times that the motion is smoothed with the model
-    lead_in = 4  # nodes at the start that only tell where a run begins
+ROUNDS = 2  # times that the motion is smoothed with the model
+LEAD_IN = 4  # nodes at the start that only tell where a run begins
 
 
 @dataclass(frozen=True)
@@ -107,9 +103,7 @@ class LinearisedState:
                 force += (theta[name] - nominal) * column
         return self.motion.defect(force)
 
-    def slopes(
-        self, theta: Theta, names: Sequence[str], runs: Collection[int] | None = None
-    ) -> Iterator[Array]:
+    def slopes(self, theta: Theta, names: Sequence[str]) -> Iterator[Array]:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
         slopes = self.forces.slopes(*values_at(self.physics, theta)) if names else np.empty(0)
         place = {n: i for i, n in enumerate(self.physics.names)}
@@ -119,7 +113,7 @@ class LinearisedState:
                 for n in names[part]
             )
             g = np.stack([self.motion.response(f) for f in forces], axis=-1)
-            yield from self.pick(self.pushed(g), runs).T
+            yield from self.pick(self.pushed(g)).T
 
     def pushed(self, g: Array) -> Array:
         """Whitened residuals (n, L, m, c) that accelerations g (n, L, k, c) make."""
@@ -136,12 +130,10 @@ class LinearisedState:
         g = np.stack([self.acceleration(t) for t in thetas], axis=-1)
         return self.whitened(y, g)
 
-    def each_residual(
-        self, thetas: Sequence[Theta], runs: Collection[int] | None = None
-    ) -> Iterator[Array]:
+    def each_residual(self, thetas: Sequence[Theta]) -> Iterator[Array]:
         """Whitened residuals (rows,) at each theta in turn."""
         for part in at_once(len(thetas)):
-            yield from self.pick(self.residuals(thetas[part]), runs).T
+            yield from self.pick(self.residuals(thetas[part])).T
 
     def with_noise(self, noise: Noise) -> LinearisedState:
         """The same logs and motion, filtered with this noise of the sensors."""
@@ -161,10 +153,10 @@ class LinearisedState:
             whole[i], done = part.T, done + int(own.sum())
         return np.asarray(whole.swapaxes(0, 1))
 
-    def pick(self, columns: Array, runs: Collection[int] | None = None) -> Array:
+    def pick(self, columns: Array) -> Array:
         """(n, L, m, ...) -> rows (rows, ...): run by run, channel by channel, in time."""
-        chosen = range(len(self.batch.resampled)) if runs is None else runs
-        return np.concatenate([columns[:, i].swapaxes(0, 1)[self.mask[:, i].T] for i in chosen])
+        runs = range(len(self.batch.resampled))
+        return np.concatenate([columns[:, i].swapaxes(0, 1)[self.mask[:, i].T] for i in runs])
 
 
 def linearise_at(
@@ -191,7 +183,7 @@ def linearise_at(
         first = first_reference(physics, batch, p)
     reference = _without_delays(batch, late - rows * dt, first)
     schedules = read_schedules(physics, batch, reference, p)
-    for _ in range(StateSettings.rounds):
+    for _ in range(ROUNDS):
         state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
@@ -229,7 +221,7 @@ def _along(
     density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
     mask = np.isfinite(motion.system.R)
-    mask[: StateSettings.lead_in] = False
+    mask[:LEAD_IN] = False
     forces = Forces(physics, batch, motion)
     gain = gains(motion.system)
     return LinearisedState(
