@@ -14,8 +14,6 @@ from kemba.files import read_json
 from kemba.identify.infer.windows import excess
 
 Verdict = Literal["missing", "partly", "nothing", "unknown", "bad-data"]
-
-
 PROBABILITY = (
     "The probability of an effect is that of its being among the missing ones. Several effects can "
     "be missing at once, so that the probabilities need not add up to 100 %."
@@ -144,8 +142,6 @@ class Answer:
 
 
 FEW = 2  # parameters of an effect that a sentence has room for
-
-
 ENDED = "the time limit ended the search; with a larger --time-limit it goes on"
 
 

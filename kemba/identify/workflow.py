@@ -1,4 +1,4 @@
-"""The error that is quoted of a model: one figure, by one function, in every verb."""
+"""From files to an answer folder: read, check, search, write."""
 
 from __future__ import annotations
 
@@ -35,8 +35,6 @@ from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 PLANT = "plant"  # the shipped simulated robot, with physical chambers
-
-
 AROUND = 0.01  # s before and after a reading from which a speed is told
 
 
@@ -101,8 +99,6 @@ def _modes(log: Trajectory) -> set[str]:
 
 
 Paths = Sequence[str | Path]
-
-
 QUOTED = 3  # of so many logs one is kept aside for the error that is quoted, where none are given
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from kemba.identify.compare.bins import (
     BinSettings,
@@ -11,6 +12,7 @@ from kemba.identify.compare.bins import (
     condition_bins,
     correlation_length,
     excess,
+    false_discoveries,
 )
 from kemba.identify.compare.hints import Slopes, within_tolerance
 from kemba.identify.infer.significance import NullTest
@@ -148,3 +150,9 @@ def test_a_window_ends_with_its_condition() -> None:
 
 def test_an_error_is_the_root_of_the_mean_square() -> None:
     assert rms(np.array([3.0, -4.0, 0.0, 0.0])) == 2.5
+
+
+@pytest.mark.parametrize("count", [1, 2, 9, 40])
+def test_false_discoveries_are_controlled_as_scipy_does(count: int) -> None:
+    p = np.random.default_rng(count).uniform(size=count) ** 3
+    assert false_discoveries(p) == pytest.approx(stats.false_discovery_control(p), rel=1e-15)

@@ -16,7 +16,7 @@ from twin import bench, cases, catalogue, figures, measure, rigs
 
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.compare.compare import Comparison, compare
-from kemba.identify.problem.missing_force import lagged
+from kemba.identify.problem.missing_force import missing_along
 from kemba.model.spec import load_model
 from kemba.plotting.study.comparison import plot_comparison
 from kemba.trajectory import Trajectory
@@ -126,8 +126,12 @@ def test_a_lag_in_white_noise_is_found_as_the_full_matrices_say() -> None:
     rng = np.random.default_rng(1)
     time = np.cumsum(rng.uniform(0.5e-3, 2e-3, 60))
     gap = 4.0 * np.sin(40 * time) + rng.normal(0.0, 1.0, 60)
-    mean, sigma, _ = lagged(time, gap, np.ones(60))
-    ends = lagged(time, 0.0 * gap, np.ones(60))[1]
+
+    def lag(gap: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = missing_along("run", time, gap, np.ones(60), ("piston/F", "N"))
+        return found.force[:, 0], found.sigma[:, 0]
+
+    (mean, sigma), (_, ends) = lag(gap), lag(0.0 * gap)
     assert np.all(sigma < 1.0) and sigma[30] < sigma[0]
     assert np.sqrt(np.mean((mean - 4.0 * np.sin(40 * time)) ** 2)) < 0.6
     assert np.all(ends < sigma)  # nothing there: less freedom, narrower bands

@@ -51,7 +51,7 @@ def test_the_designed_test_is_short_and_better_per_second(
     folder = answer(tmp_path, ("seal_friction", "F_c", 8.0), ("piston_damping", "c", 30.0))
     told: list[str] = []
     found = propose(folder, tmp_path / "next.yaml", told.append, bounded=False)
-    standard, designed = found.design.standard, found.design.designed
+    standard, designed = found.standard, found.designed
     assert found.chosen is designed and found.nats > 5 and "decisive" in found.sentence
     assert designed.log_s <= min(2.0, 0.5 * standard.log_s) and designed.pace > standard.pace
     assert "locked" not in standard.rig.name  # a rod at rest shows neither

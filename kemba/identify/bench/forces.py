@@ -14,7 +14,7 @@ from kemba.identify.bench.prediction import PredictedLogs
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.infer.linear import within
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
-from kemba.identify.problem.missing_force import dahl, end_terms, lagged
+from kemba.identify.problem.missing_force import dahl, end_terms, missing_along
 from kemba.identify.problem.types import (
     Array,
     Candidate,
@@ -40,10 +40,7 @@ def bench_missing(
         expected, variance = predicted.readings(theta, i)[FORCE]
         keep = log.keep[FORCE]
         time, gap = log.motion.time[keep], (log.measured[FORCE] - expected)[keep]
-        known = None if strength is None else float(strength[0])
-        force, sigma, used = lagged(time, gap, variance[keep], known)
-        found.append(MissingForce(log.name, time, (FORCE,), ("N",), force[:, None], sigma[:, None],
-                             np.array([used])))  # fmt: skip
+        found.append(missing_along(log.name, time, gap, variance[keep], (FORCE, "N"), strength))
     return found
 
 

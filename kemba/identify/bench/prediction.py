@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.effects.base import Effect
 from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.effects.pneumatics.switching import delayed
 from kemba.effects.series import Series
@@ -15,7 +14,7 @@ from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
-from kemba.identify.problem.candidates import by_default, nominal_figures, switched_on
+from kemba.identify.problem.candidates import Compiled, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.mechanism import Cylinder
@@ -24,42 +23,25 @@ from kemba.model.model import Model
 SENT_LATE = "sent:late"  # nuisance of slow logs [s]: by how much all commands were sent later
 
 
-class BenchPredictor:
-    """Rigs of one model, each compiled once with the effects that theta switches on.
+class BenchPredictor(Compiled[RigModel]):
+    """Rigs of one model.
 
-    `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
     `exact`: what a late force sensor shows is computed at its own times, not read off between rows.
     """
 
     exact = False
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
-        self.model, self.candidates = model, candidates
-        self.figures = nominal_figures(model)
+        super().__init__(model, candidates, nominal_figures(model), RigModel)
         self.sensors = SensorFaults(model.effects)
-        self._rigs: dict[tuple[str, ...], RigModel] = {}
-
-    def rig(self, theta: Theta) -> RigModel:
-        """The rig with the effects on its list that theta switches on."""
-        active = switched_on(self.candidates, theta)
-        if active not in self._rigs:
-            extra = [by_default(self.candidates[name].effect) for name in active]
-            model = self.model.with_effects(_unlike(self.model, extra))
-            keys = (key for name in active for key in tuple(self.candidates[name].keys()))
-            free = tuple(key for key in keys if key in model.parameters)
-            self._rigs[active] = RigModel(model, free, tuple(self.figures))
-        return self._rigs[active]
 
     def predict(
         self, run: BenchLog, theta: Theta, start: Mapping[str, float] | None = None
     ) -> Prediction:
         """What happens on the rig, before any sensor; where `exact`, at the times that the force of
         a row is of. `start`: by how much states differ from rest when the log begins."""
-        rig = self.rig(theta)
-        nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        values = {name: theta.get(name, nominal.get(name, 0.0)) for name in rig.names}
-        sent = self.sent(run, theta)
-        late = self._shift(theta)
+        rig, sent, late = self.at(theta), self.sent(run, theta), self._shift(theta)
+        values = self.values(theta, rig.names)
         return rig.predict(self.true_motion(run, theta), sent.commands, values, start or {}, late)
 
     def _shift(self, theta: Theta) -> float:
@@ -105,16 +87,10 @@ class BenchPredictor:
 
     def acting(self, run: BenchLog, theta: Theta) -> Array:
         """Share of each sample's neighbourhood in which the valves act (n, 2)."""
-        delays = self.rig(theta).timing(theta)
+        delays = self.at(theta).timing(theta)
         times = run.motion.time
         sent = self.sent(run, theta).commands
         return np.stack([share(delayed(c, *delays), times) for c in sent], axis=1)
-
-
-def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:
-    """Effects not on the model's list already; those that are stay as they are."""
-    names = {e.name for e in model.effects}
-    return [e for e in extra if e.name not in names]
 
 
 def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylinder) -> Array:

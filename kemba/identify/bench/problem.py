@@ -26,8 +26,7 @@ from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, Predicted
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
-from kemba.identify.problem.noise import Colour, colours, whiten, whitened
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.noise import ColouredProblem, colours, whiten
 from kemba.identify.problem.types import (
     Array,
     Candidate,
@@ -51,15 +50,11 @@ STEP = 0.1  # step of finite differences of a start, as a share of the state's s
 REST = 2e-3  # speed below which the piston rests [m.s-1]
 
 
-class BenchProblem(Problem):
+class BenchProblem(ColouredProblem):
     """Residuals of bench runs; effects join the model's list when theta switches them on.
 
-    `colour`: noise colour by run and channel; without any, residuals are not whitened. `left` (n,):
-    the residual from which it was learnt. `drift`: whose clock gained on the others before the logs
-    were put on one clock, and its rate.
+    `drift`: whose clock gained on the others before the logs were put on one clock, and its rate.
     """
-
-    learns_colour = True
 
     def __init__(
         self,
@@ -78,7 +73,7 @@ class BenchProblem(Problem):
         hidden = {n: c for n, c in self.candidates.items() if _within(c, row)}
         self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
         predictor = BenchPredictor(model, self.candidates)
-        states = predictor.rig({}).state_names
+        states = predictor.at({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
         self.nuisance = predictor.figures | predictor.sensors.nuisance | clocks.nuisance(drift)
@@ -91,8 +86,6 @@ class BenchProblem(Problem):
         for channel in self.channels[1:]:
             self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, PRESSURE_ZERO)
             self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, PRESSURE_GAIN)
-        self.colour: Mapping[tuple[int, int], Colour] = {}
-        self.left: Array | None = None
 
     @property
     def logs(self) -> tuple[BenchLog, ...]:
@@ -185,13 +178,6 @@ class BenchProblem(Problem):
         """Force residual, and what a force could depend on."""
         return leftover(self.predicted, theta, self.candidates)
 
-    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
-        """The same problem with the colour of every run and channel learnt from `residual` (n,), or
-        forgotten."""
-        found, found.left = copy(self), residual
-        found.colour = {} if residual is None else colours(self.rows(), residual, careful)
-        return found
-
     def drifting(self) -> Self | None:
         """The same problem with sensors that may also drift, by as much as their stated noise."""
         if self.left is None or any(c.drift for c in self.colour.values()):
@@ -210,10 +196,6 @@ class BenchProblem(Problem):
         predictor.exact = True
         found.predicted = replace(self.predicted, predictor=predictor)
         return found
-
-    def whiten(self, columns: Array) -> Array:
-        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
-        return whitened(self.rows(), columns, self.colour)
 
     def validate(self) -> list[str]:
         """A remark on clocks that drift apart. Raises BadData where columns must be mixed up."""

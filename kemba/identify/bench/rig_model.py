@@ -23,8 +23,6 @@ from kemba.model.rest import Rest, rate_of
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
 
 Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
-
-
 STEP = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
 CHUNK = 512  # steps per call of a compiled function
 # time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1

@@ -13,8 +13,6 @@ from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.problem.types import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
-
-
 BETTER = 4.0  # factor by which a mix-up must fit better
 SMALL = 4.0  # error, in sigmas, that no mix-up would leave
 CLOSE = 0.25  # share of the force's spread that a mix-up may leave

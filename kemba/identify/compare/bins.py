@@ -1,7 +1,4 @@
-"""Tails of distributions, and the control of false discoveries, by `scipy.special` alone.
-
-They are those of `scipy.stats`, whose import takes half a second of every comparison.
-"""
+"""Errors by condition: channel, phase of motion, valve mode and region of the piston's stroke."""
 
 from __future__ import annotations
 
@@ -11,25 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import chdtrc, ndtr, ndtri
+from scipy.special import chdtrc  # importing scipy.stats takes half a second
 
 from kemba.identify.infer.windows import codes, rms
 from kemba.identify.problem.types import Array, Labels, Rows, Texts
-
-
-def chi2_above(value: float, degrees: float) -> float:
-    """The chance that chi-squared with these degrees of freedom is larger."""
-    return float(chdtrc(degrees, value))
-
-
-def normal_above(value: Array) -> Array:
-    """The chances (n,) that a standard normal is larger than `value` (n,)."""
-    return np.asarray(ndtr(-np.asarray(value)))
-
-
-def normal_at(chance: float) -> float:
-    """The value that a standard normal exceeds with this chance."""
-    return float(-ndtri(chance))
 
 
 def false_discoveries(chances: Sequence[float] | Array) -> Array:
@@ -47,10 +29,7 @@ def false_discoveries(chances: Sequence[float] | Array) -> Array:
 
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
-
-
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
-
 
 # phases of motion and open valves (extend, retract) in words, in the order in which they are shown
 PHASES = {
@@ -61,8 +40,6 @@ PHASES = {
     "flight": "in the air",
     "moving": "moving",
 }
-
-
 MODES = {"00": "closed", "10": "extend", "01": "retract", "11": "both"}
 
 
@@ -138,7 +115,7 @@ def excess(z: Array) -> float:
     if len(z) > 1:
         z = np.delete(z, np.argmax(np.abs(z)))
     count = len(z) / correlation_length(z**2)
-    return chi2_above(np.mean(z**2) / BinSettings.tolerated**2 * count, count)
+    return float(chdtrc(count, np.mean(z**2) / BinSettings.tolerated**2 * count))
 
 
 def correlation_length(y: Array) -> float:

@@ -1,4 +1,5 @@
-"""How much of an error the model's figures could explain if they were off by their tolerance."""
+"""What the error goes with: a force by speed, position or load, commands sent before it, and
+parameters that would have to differ between runs or between valve modes."""
 
 from __future__ import annotations
 
@@ -6,8 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtrc, ndtr, ndtri
 
-from kemba.identify.compare.bins import chi2_above, false_discoveries, normal_above, normal_at
+from kemba.identify.compare.bins import false_discoveries
 from kemba.identify.compare.force_profiles import (
     ForceProfile,
     ForceProfileSettings,
@@ -69,7 +71,7 @@ def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
     columns = np.hstack([spike * known.by_lead, known.by_nuisance])
     h = columns.T @ columns + np.eye(columns.shape[1])
     off = -np.linalg.solve(h, columns.T @ residual)
-    q = false_discoveries(2.0 * normal_above(np.abs(off))) if len(off) else np.ones(1)
+    q = false_discoveries(2.0 * ndtr(-np.abs(off))) if len(off) else np.ones(1)
     return Tolerant(residual + columns @ off, float(q.min()))
 
 
@@ -111,7 +113,7 @@ class Response:
     @property
     def certain(self) -> bool:
         certain = CERTAIN
-        return bool(np.abs(self.z[self.peak]) > normal_at(certain / (2 * self.tests)))
+        return bool(np.abs(self.z[self.peak]) > -ndtri(certain / (2 * self.tests)))
 
     @property
     def hint(self) -> Hint:
@@ -214,4 +216,4 @@ def _agreement(information: Array, pull: Array) -> float:
     certainty = np.linalg.inv(spread + imperfect**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
-    return chi2_above(float(apart @ certainty @ apart), len(a) - 1)
+    return float(chdtrc(len(a) - 1, float(apart @ certainty @ apart)))

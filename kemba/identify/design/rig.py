@@ -128,22 +128,14 @@ def _plain(places: int, pulses: int) -> Iterator[Array]:
         yield np.concatenate([way, early, early, [1.0]])
 
 
-@dataclass(frozen=True)
-class Best:
-    """The best point (k,) of the unit cube, its worth, and how many points were tried."""
-
-    point: Array
-    worth: float
-    tried: int
-
-
 def best_point(
     worth: Callable[[Array], float],
     begin: Array,
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
-) -> Best:
-    """The point of the unit cube that is worth most, as far as a bounded search finds it.
+) -> tuple[Array, int]:
+    """The point (k,) of the unit cube that is worth most, as far as a bounded search finds it, and
+    how many were tried.
 
     `begin` (m, k): the first points that are tried. `bounded`: stop when the time is over; without
     it the answer depends on nothing but the seed.
@@ -176,8 +168,7 @@ def best_point(
         tol=0.0,
         callback=report,
     )
-    top, point = max(seen, key=lambda item: item[0])
-    return Best(point, top, len(seen))
+    return max(seen, key=lambda item: item[0])[1], len(seen)
 
 
 @dataclass(frozen=True)
@@ -194,64 +185,6 @@ class RigDesign:
         clear = ExperimentSettings.clear
         least, other = self.designed.evidence.least, self.standard.evidence.least
         return self.standard if least < min(clear, other) else self.designed
-
-
-def design_rig_test(
-    model: Model,
-    rivals: Rivals,
-    say: Callable[[str], None] = lambda text: None,
-    bounded: bool = True,
-) -> RigDesign | None:
-    """The test of the piston of `model` that tells the rivals apart best; `bounded`: in about a
-    minute.
-
-    None where a rig cannot show two of them.
-    """
-    bench, settings = (VirtualBench(model, ExperimentSettings.rows), RigCourseSettings)
-    coarse = VirtualBench(model, ExperimentSettings.coarse)
-    say("judging the standard tests")
-    standards = list(judged_menu(coarse, rivals))
-    if not standards:
-        return None
-    standard = max(standards, key=lambda j: j.evidence.least)
-    duration = settings.share * standard.log_s
-    duration = float(np.clip(duration, settings.shortest, settings.longest))
-
-    def worth(point: Array) -> float:
-        found = separation(coarse.problem(course(point, duration, bench.stroke)), rivals)
-        return found.worth if found is not None else 0.0
-
-    search = DesignSearchSettings
-    say(f"designing a test of {duration:.1f} s")
-    best = best_point(worth, beginnings(search.members, search.seed), say, bounded)
-    rig = course(best.point, duration, bench.stroke)
-    say("fitting the rivals to what the tests would measure")
-    before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
-    return RigDesign(before, after, best.tried)
-
-
-def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
-    """A test, its evidence between the nearest rivals by a fit in place of slopes."""
-    problem = bench.problem(rig)
-    straight = separation(problem, rivals)
-    assert straight is not None
-    first, nearest = straight.first, straight.nearest
-    logs = as_predicted(problem, rivals.theta(first))
-    fitted = evidence(logs, rivals, nearest)
-    nats = {**straight.nats, nearest: min(fitted, straight.least)}
-    return JudgedRig(rig, Separation(first, nats), log_time(rig, bench.stroke))
-
-
-@dataclass(frozen=True)
-class Proposal:
-    """A test of a rig, and the evidence that is expected of it and of the best standard test."""
-
-    design: RigDesign
-
-    @property
-    def chosen(self) -> JudgedRig:
-        """The test that was written."""
-        return self.design.chosen
 
     @property
     def rig(self) -> Rig:
@@ -272,7 +205,7 @@ class Proposal:
     def sentence(self) -> str:
         """What the test gains, in words."""
         first, second = self.rivals
-        chosen, standard = self.chosen, self.design.standard
+        chosen, standard = self.chosen, self.standard
         word, length = strength(self.nats), f"{chosen.log_s:.2g} s of log"
         if self.nats < ExperimentSettings.clear:
             return (
@@ -292,7 +225,6 @@ class Proposal:
 
     def json(self) -> dict[str, Any]:
         """The figures behind the sentence; `designed` and `standard` have the same keys."""
-        design = self.design
         return {
             "rig": self.rig.name,
             "nats": self.nats,
@@ -300,10 +232,56 @@ class Proposal:
             "sentence": self.sentence,
             "strength": strength(self.nats),
             "log_s": self.chosen.log_s,
-            "designed": _figures(design.designed),
-            "standard": _figures(design.standard),
-            "tried": design.tried,
+            "designed": _figures(self.designed),
+            "standard": _figures(self.standard),
+            "tried": self.tried,
         }
+
+
+def design_rig_test(
+    model: Model,
+    rivals: Rivals,
+    say: Callable[[str], None] = lambda text: None,
+    bounded: bool = True,
+) -> RigDesign | None:
+    """The test of the piston of `model` that tells the rivals apart best; `bounded`: in about a
+    minute.
+
+    None where a rig cannot show two of them.
+    """
+    bench, settings = VirtualBench(model, ExperimentSettings.rows), RigCourseSettings
+    coarse = VirtualBench(model, ExperimentSettings.coarse)
+    say("judging the standard tests")
+    standards = list(judged_menu(coarse, rivals))
+    if not standards:
+        return None
+    standard = max(standards, key=lambda j: j.evidence.least)
+    duration = settings.share * standard.log_s
+    duration = float(np.clip(duration, settings.shortest, settings.longest))
+
+    def worth(point: Array) -> float:
+        found = separation(coarse.problem(course(point, duration, bench.stroke)), rivals)
+        return found.worth if found is not None else 0.0
+
+    search = DesignSearchSettings
+    say(f"designing a test of {duration:.1f} s")
+    point, tried = best_point(worth, beginnings(search.members, search.seed), say, bounded)
+    rig = course(point, duration, bench.stroke)
+    say("fitting the rivals to what the tests would measure")
+    before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
+    return RigDesign(before, after, tried)
+
+
+def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
+    """A test, its evidence between the nearest rivals by a fit in place of slopes."""
+    problem = bench.problem(rig)
+    straight = separation(problem, rivals)
+    assert straight is not None
+    first, nearest = straight.first, straight.nearest
+    logs = as_predicted(problem, rivals.theta(first))
+    fitted = evidence(logs, rivals, nearest)
+    nats = {**straight.nats, nearest: min(fitted, straight.least)}
+    return JudgedRig(rig, Separation(first, nats), log_time(rig, bench.stroke))
 
 
 def propose(
@@ -311,7 +289,7 @@ def propose(
     out: Path,
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
-) -> Proposal:
+) -> RigDesign:
     """The test of a rig that best tells the possible effects of an answer apart, a YAML in `out`.
 
     `bounded`: in about a minute. Raises KembaError where no test shows a difference, or a file
@@ -324,11 +302,10 @@ def propose(
         what = f"its model {model.name} is a rig of your own, of kind {model.mechanism.rig}"
         hint = "tests are designed for a piston with valves and for the robot only"
         raise KembaError(str(folder), what, hint=hint)
-    design = design_rig_test(model, rivals, say, bounded)
-    if design is None:
+    found = design_rig_test(model, rivals, say, bounded)
+    if found is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no rig test shows a difference between {names}")
-    found = Proposal(design)
     rig = {"kind": found.rig.kind, **found.rig.model_dump(mode="json", exclude_defaults=True)}  # type: ignore[attr-defined]
     dump_yaml({"rig": {**rig, "notes": found.sentence}}, out)
     return found

@@ -1,4 +1,4 @@
-"""Drifts of all sensors as columns: a formula must explain more than they do."""
+"""Simple terms of a force, judged by the same evidence as the effects of the catalogue."""
 
 from __future__ import annotations
 

@@ -24,11 +24,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import chdtrc, stdtrit
 
 from kemba.errors import enumerated
 from kemba.identify.answer import Covariance, Value
-from kemba.identify.compare.bins import chi2_above
 from kemba.identify.infer.linear import is_shape, time_blocks
 from kemba.identify.infer.refit import Frozen, refit
 from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
@@ -41,14 +40,8 @@ from kemba.identify.problem.types import Array, Candidate, Labels, Theta
 from kemba.model.model import Model
 
 BLOCKS = (12, 24, 48)  # of time, at least; with fewer than 12 the scatter itself is not known
-
-
 DISAGREE = 0.01  # p-value from which runs disagree
-
-
 TELLS = 0.1  # share of the best run's information from which a run is asked
-
-
 OF_A_RUN = 6  # blocks of a run, at least, from which its own scatter is told
 
 
@@ -101,25 +94,16 @@ def apart_between_runs(
         error = np.sqrt(np.maximum(scatter, power)[asked]) / power[asked]
         weight = error**-2.0
         mean = float(weight @ step / weight.sum())
-        if chi2_above(float(weight @ (step - mean) ** 2), int(asked.sum()) - 1) < DISAGREE:
+        if chdtrc(int(asked.sum()) - 1, float(weight @ (step - mean) ** 2)) < DISAGREE:
             yield i, (float(step.min()), float(step.max()))
 
 
 # of what a rig brings along: the figure that its logs tell better than any drawing
 TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
-
-
 LOOSE = 0.5  # prior sigma of its factor: as good as none
-
-
 ALIKE = 0.998  # cosine of slopes from which two figures are one
-
-
 FAR = 3.0  # tolerances by which a figure is off that is told
-
-
 ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
-
 
 # a share of another structure, and factors of a table, which are no parameters by themselves
 UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))

@@ -120,8 +120,6 @@ def effect_bounds(
 
 
 Names = tuple[str, ...]
-
-
 ROUNDS = 2  # linear steps
 
 

@@ -1,4 +1,4 @@
-"""Thresholds of the answer of `discover`."""
+"""The effects in order of probability, with their parameters and their equivalents."""
 
 from __future__ import annotations
 

@@ -151,25 +151,17 @@ def unfinished(search: Search, best: Hypothesis) -> bool:
 
 
 BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
-
-
 NEXT = {  # by the end of a channel's name
     "piston": BENCH,
     "rod": BENCH,
     "hip": "swing this hip in the air with closed valves, slowly and fast",
     "pitch": "tilt the body by hand in the air, and let it drop with the legs at rest",
 }
-
-
 BODY = "let the robot drop with the legs at rest, and move the boom by hand"
-
-
 ON_RIGS = {  # by the kind of rig of the model; a piston of the robot on its bench has none
     "drive": "move the axis slowly and fast, to and fro, with and without load",
     "vessel": "fill and empty the vessel from several pressures",
 }
-
-
 STROKES = "move the rod slowly and fast over its whole stroke, hold it between, at other pressures"
 
 

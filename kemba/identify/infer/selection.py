@@ -166,7 +166,7 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
     an answer than their scatter. Its p-value counts rows, whose noise may be slower than it is
     taken to be."""
     gain = gain_over_nothing(search, best)
-    return not gain.pays or gain.nats < _least()
+    return not gain.pays or gain.nats < BootstrapSettings.least
 
 
 def none_of(belief: Belief) -> Belief:
@@ -183,7 +183,7 @@ def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     """Whether a hypothesis predicts left-out data as well as the `best`: within one standard error
     of it, or with less than any evidence between them."""
     gain = window_gain(search, best, hypothesis)
-    return not gain.pays or gain.nats < _least()
+    return not gain.pays or gain.nats < BootstrapSettings.least
 
 
 def is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
@@ -201,11 +201,6 @@ def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     rows = search.points[larger].windowed.count.sum()
     left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
     return window_gain(search, larger, smaller).nats < SHARE * left
-
-
-def _least() -> float:
-    """Nats that are any evidence at all."""
-    return BootstrapSettings.least
 
 
 def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
@@ -276,11 +271,7 @@ def strength(search: Search, effect: str, best: Hypothesis) -> float:
 
 
 ANY = 1.0  # nats that are any evidence at all
-
-
 STRONG = 5.0  # nats of strong evidence, by Kass and Raftery 1995
-
-
 SAME = 2e-3  # share of an error by which it must change to have changed: rounding of the fit
 
 

@@ -1,4 +1,4 @@
-"""Is nothing missing? The linear search, repeated on simulated logs in which nothing is."""
+"""Is anything missing at all? What the best effect gains, and what chance would."""
 
 from __future__ import annotations
 

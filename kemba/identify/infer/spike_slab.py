@@ -1,4 +1,4 @@
-"""Evidence of many hypotheses that differ from one in a few effects, from one factor."""
+"""Evidence for "these effects are large and all others are small", by linear algebra."""
 
 from __future__ import annotations
 
@@ -90,8 +90,6 @@ class SpikeSlabSettings:
 
 
 Hypothesis = tuple[str, ...]  # names of the effects that are large, sorted
-
-
 NULL: Hypothesis = ()
 
 

@@ -1,8 +1,10 @@
-"""The figures of another structure, fitted before anything is searched beside them.
+"""Another structure: its figures fitted first, then what the model with that structure lacks.
 
+With another structure every effect reads other states, and the motion that is found in the logs
+changes. So the problem is built anew on the model with the new structure, and searched again.
 Predictions bend with orifices, volumes and pressures, so that one linear step from their usual
-values leads anywhere. The fit goes by bounded steps that are taken only where the innovations
-become likelier, and the motion is found again in between, because the figures change it.
+values leads anywhere: the fit of the figures goes by bounded steps that are taken only where the
+innovations become likelier, and the motion is found again in between.
 """
 
 from __future__ import annotations

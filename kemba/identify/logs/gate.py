@@ -1,4 +1,4 @@
-"""A fault of a log, with its file, row and column."""
+"""Checks before a fit: a log that cannot be right is refused, with row and column."""
 
 from __future__ import annotations
 

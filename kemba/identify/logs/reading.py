@@ -134,20 +134,10 @@ def _positive(value: Any, written: str, unit: str, place: str, hint: str = "") -
 
 
 Kind = Literal["robot", "bench", "cylinder", "drive", "vessel"]
-
-
 BODY = ("body/x", "body/z", "body/pitch")
-
-
 LEG = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
-
-
 BENCH = ("piston/x", "valve/extend", "valve/retract", "piston/F")
-
-
 KINDS = ("robot", "bench", "cylinder", "drive", "vessel")
-
-
 OWN_RIGS = ("cylinder", "drive", "vessel")
 
 

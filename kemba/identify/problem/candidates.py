@@ -1,11 +1,9 @@
-"""Nominal figures that every fit leaves free: what a machine has a little different from its model.
-
-Which they are and by how much is declared by the effect or the mechanism whose figures they are.
-"""
+"""What may be missing: effects of the catalogue that a model could have, and sensor faults."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Generic, TypeVar
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
@@ -52,6 +50,7 @@ def leg_by_leg(model: Model) -> Model:
     return Model(model.mechanism, effects, model.supply, model.name)
 
 
+T = TypeVar("T")
 SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}
 
 
@@ -96,6 +95,41 @@ def switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str,
         for name, c in sorted(candidates.items())
         if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
     )
+
+
+class Compiled(Generic[T]):
+    """A model compiled with the effects that theta switches on, each set of effects once.
+
+    `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
+    `build` takes a model and the numbers that are left open: free parameters, scaled figures.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        candidates: Mapping[str, Candidate],
+        figures: dict[str, tuple[float, float]],
+        build: Callable[[Model, tuple[str, ...], tuple[str, ...]], T],
+    ) -> None:
+        self.model, self.candidates, self.figures = model, candidates, figures
+        self._build, self._known = build, dict[tuple[str, ...], T]()
+
+    def at(self, theta: Theta) -> T:
+        """The model with the effects on its list that theta switches on."""
+        active = switched_on(self.candidates, theta)
+        if active not in self._known:
+            present = {e.name for e in self.model.effects}
+            extra = (e for e in map(by_default, active) if e.name not in present)
+            model = self.model.with_effects(extra)
+            keys = (key for name in active for key in tuple(self.candidates[name].keys()))
+            free = tuple(key for key in keys if key in model.parameters)
+            self._known[active] = self._build(model, free, tuple(self.figures))
+        return self._known[active]
+
+    def values(self, theta: Theta, names: Iterable[str]) -> dict[str, float]:
+        """What these open numbers are at theta."""
+        nominal = {name: factor for name, (factor, _) in self.figures.items()}
+        return {name: theta.get(name, nominal.get(name, 0.0)) for name in names}
 
 
 def where_field(kind: str) -> str:

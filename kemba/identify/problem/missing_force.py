@@ -14,31 +14,37 @@ from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.identify.problem.types import Array, MissingForce
 
-# The missing force of a bench log.
 MEMORY = 0.025  # correlation time of the missing force [s]
 ROUNDS = 20  # rounds in which its strength is learnt
 BEGIN = 5.0  # strength (1 sigma) with which learning begins [N]
 NEGLIGIBLE = 0.05  # strength that is as good as none [N]
 
 
-def lagged(
-    time: Array, gap: Array, variance: Array, known: float | None = None
-) -> tuple[Array, Array, float]:
-    """Estimate (n,) and 1 sigma (n,) of a first-order lag, and its strength.
+def missing_along(
+    run: str,
+    time: Array,
+    gap: Array,
+    variance: Array,
+    channel: tuple[str, str],
+    strength: Array | None = None,
+) -> MissingForce:
+    """The force that is missing in one channel (name and unit) of a run, with its band.
 
-    `time` (n,) [s]; `gap` (n,): the lag plus white noise of `variance` (n,). The strength (1 sigma
-    of the lag) is learnt unless it is `known`.
+    `time` (n,) [s]; `gap` (n,): the force plus white noise of `variance` (n,). Its `strength` (1,),
+    1 sigma, is learnt when it is not given.
     """
     keep = np.exp(-np.diff(time) / MEMORY)
-    strength = known or BEGIN
-    for _ in range(1 if known else ROUNDS):
-        used = strength
-        bands = _precision(keep, strength)
+    sigma = BEGIN if strength is None else float(strength[0])
+    for _ in range(ROUNDS if strength is None else 1):
+        used = sigma
+        bands = _precision(keep, sigma)
         bands[1] += 1.0 / variance
         mean = solveh_banded(bands, gap / variance)
         spread = _inverse_diagonal(bands)
-        strength = max(float(np.sqrt(np.mean(mean**2 + spread))), NEGLIGIBLE)
-    return np.asarray(mean), np.sqrt(spread), used
+        sigma = max(float(np.sqrt(np.mean(mean**2 + spread))), NEGLIGIBLE)
+    name, unit = channel
+    columns = mean[:, None], np.sqrt(spread)[:, None]
+    return MissingForce(run, time, (name,), (unit,), *columns, np.array([used]))
 
 
 def _precision(keep: Array, strength: float) -> Array:

@@ -8,13 +8,17 @@ learnt on what a flexible model leaves over.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from typing_extensions import Self
 
+from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_noise import ColourSettings
 from kemba.identify.problem.types import Array, Flags, Labels, Rows
 
@@ -293,3 +297,27 @@ def whitened(rows: Rows, columns: Array, by: Mapping[tuple[int, int], Colour]) -
         own = (rows.run == i) & (rows.channel == k)
         out[own] = whiten(columns[own], colour)
     return np.asarray(out)
+
+
+class ColouredProblem(Problem):
+    """A problem whose noise has a colour of its own in every run and channel.
+
+    `colour` by run and channel; without any, residuals are not whitened. `left` (n,): the residual
+    from which it was learnt.
+    """
+
+    learns_colour = True
+    colour: Mapping[tuple[int, int], Colour] = MappingProxyType({})
+    left: Array | None = None
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem with the colour of every run and channel learnt from `residual` (n,), or
+        forgotten."""
+        found = copy(self)
+        found.left = residual
+        found.colour = {} if residual is None else colours(self.rows(), residual, careful)
+        return found
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
+        return whitened(self.rows(), columns, self.colour)

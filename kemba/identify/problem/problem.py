@@ -1,4 +1,8 @@
-"""Residuals where little can be predicted, and their finite differences."""
+"""The contract between logs and search: a set of logs under one model, as whitened residuals.
+
+A bench log and a robot log differ in everything but this contract. A subclass of `Problem` owns
+the prediction and the noise. Ranking, search, doubts and the answer work on any `Problem`.
+"""
 
 from __future__ import annotations
 

@@ -21,23 +21,15 @@ from kemba.model.model import Model
 from kemba.quantity import Param, Quantity, Tolerance
 
 ORIFICE = "chambers:orifice"
-
-
 LEVEL = "level"
-
-
 FIGURES = {  # as a model that has orifice chambers calls them: as the candidate does
     **{f"orifice_chamber.{k}": k for k in ("a_fill", "a_vent", "V_e", "V_r", "n")},
     "orifice_chamber.gauge": LEVEL,
 }
 
-
 # effects that those figures stand for, once they are free
 FREE_THEN = ("supply_scale", "rise_time_scale")
-
-
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
-
 
 # How far the figures of orifice chambers may be from the usual ones: 1 sigma of their.
 AREA = 0.2  # of an orifice's area
@@ -142,7 +134,6 @@ def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:
 
 
 LINE = "supply_line"
-
 
 # Where the supply line's figures are looked for.
 NONE = 1e3  # reciprocal of an orifice that is none [m-2]: 200 times a valve's area

@@ -21,7 +21,6 @@ Changes = Mapping[str, tuple[Array, Array]]  # command -> times [s] and sizes of
 
 REGIONS = ("in", "mid", "out")
 
-
 # length of the region at each end of the stroke [m]: as long as the cushion of the catalogue
 END = 0.010
 

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.series import Series
-from kemba.identify.problem.candidates import by_default, nominal_figures, switched_on
+from kemba.identify.problem.candidates import Compiled, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, Filtered, RigLog
@@ -104,46 +104,27 @@ class Balance:
 
 
 SEALS = "measured_chambers.travel"
-
-
 TRAVEL = 0.5  # prior sigma of the travel until they slide, as a share of it
-
-
 LEAST = 0.05  # smallest force of a motor over that of the log
 
 
-class Predictor:
-    """Balances of one model, each compiled once with the effects that theta switches on.
-
-    `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
-    """
+class Predictor(Compiled[Balance]):
+    """Balances of one model, and what its sensors make of them."""
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
-        self.model, self.candidates = model, candidates
+        super().__init__(model, candidates, nominal_figures(model), Balance)
         rig = model.mechanism.rig
         self.place, self.answer = PLACE[rig], ANSWER[rig]
-        self.figures = nominal_figures(model)
         if rig == "cylinder":
             self.figures[SEALS] = (1.0, TRAVEL)
         self.sensors = SensorFaults(model.effects)
-        self._known: dict[tuple[str, ...], Balance] = {}
-
-    def balance(self, theta: Theta) -> Balance:
-        """The balance with the effects on its list that theta switches on."""
-        active = switched_on(self.candidates, theta)
-        if active not in self._known:
-            model = self.model.with_effects(by_default(name) for name in active)
-            keys = (key for name in active for key in tuple(self.candidates[name].keys()))
-            free = tuple(key for key in keys if key in model.parameters)
-            self._known[active] = Balance(model, free, tuple(self.figures))
-        return self._known[active]
 
     def gap(self, log: RigLog, theta: Theta) -> Array:
         """Predicted less measured force (k,) at the judged rows."""
         channels, time = self.true(log.channels, theta), log.time
-        expected = self.balance(theta).force(channels, self._values(theta))
+        expected = self.at(theta).force(channels, self._values(theta))
         measured = channels.others[self.answer][channels.rows]
-        if self.answer in self.balance(theta).inputs:  # in the unit of what the motor was told
+        if self.answer in self.at(theta).inputs:  # in the unit of what the motor was told
             return np.asarray((expected - measured) / self._gain(theta))
         shown = self.sensors.shown(theta, self.answer, Series(time, expected))
         return np.asarray(shown.value - measured)
@@ -158,11 +139,11 @@ class Predictor:
         """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt
         where the sign of the rate is."""
         channels = log.channels
-        slopes = self.balance({}).slopes(channels, self._values({}))
-        sigmas = [channels.a_sigma, *(channels.sigma[n] for n in self.balance({}).inputs)]
+        slopes = self.at({}).slopes(channels, self._values({}))
+        sigmas = [channels.a_sigma, *(channels.sigma[n] for n in self.at({}).inputs)]
         noise = (slopes * sigmas) ** 2
         total = noise.sum(axis=1) + (usual * log.doubt) ** 2
-        if self.answer not in self.balance({}).inputs:
+        if self.answer not in self.at({}).inputs:
             total = total + channels.sigma[self.answer] ** 2
         else:  # the motor's force enters once: as what was measured, in whose unit all else counts
             others = (total - noise[:, -1]) / self._gain({}) ** 2
@@ -186,5 +167,4 @@ class Predictor:
         return replace(log, q=moved.value, v=v, a=a, others=others, read=read)
 
     def _values(self, theta: Theta) -> dict[str, float]:
-        nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        return {name: theta.get(name, nominal.get(name, 0.0)) for name in self.balance(theta).names}
+        return self.values(theta, self.at(theta).names)

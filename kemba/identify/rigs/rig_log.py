@@ -25,7 +25,6 @@ from kemba.trajectory import Trajectory
 # noise of value, rate, acceleration behind a Gaussian of s samples: c sigma / (step^k s^(k + 1/2))
 GAIN = (0.5311, 0.3756, 0.4600)
 
-
 # How the channels of a rig's log are filtered.
 WIDTHS = (3, 4, 6, 8, 12, 16, 24, 32)  # widths (1 sigma) in samples that are tried
 # noise of the rate that is small enough, as a share of `sign_speed`: the sign of a rate is then
@@ -168,10 +167,7 @@ def _nothing(names: list[str]) -> Filtered:
 
 
 ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
-
-
 PLACE = {"cylinder": "piston/x", "drive": "axis/q"}
-
 
 # Which rows of a rig's log a friction is known in.
 # travel after a turn within which friction is in doubt, over that in which seals stretch: that

@@ -1,4 +1,4 @@
-"""The air in a vessel over time, by its model: a fixed-step integration, compiled."""
+"""Logs of a vessel that blows down: pressure and temperature predicted from the start."""
 
 from __future__ import annotations
 
@@ -10,12 +10,7 @@ import numpy as np
 
 from kemba.effects.series import Series
 from kemba.identify.infer.refit import RefitSettings
-from kemba.identify.problem.candidates import (
-    by_default,
-    nominal_figures,
-    sensor_candidates,
-    switched_on,
-)
+from kemba.identify.problem.candidates import Compiled, nominal_figures, sensor_candidates
 from kemba.identify.problem.problem import Problem, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Rows, Theta
@@ -55,7 +50,6 @@ class BlowDown:
 
 
 CHANNELS = ("vessel/P", "vessel/T")
-
 
 # How well a vessel's readings and its start are known.
 NOISE = 0.01  # noise of a reading over the range of its channel
@@ -129,7 +123,7 @@ class VesselProblem(Problem):
             self.candidates[name] = fault
         self.sensors, self.figures = SensorFaults(model.effects), nominal_figures(model)
         self.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
-        self._known: dict[tuple[str, ...], BlowDown] = {}
+        self._blow_down = Compiled(model, self.candidates, self.figures, BlowDown)
         starts = {}
         for i, log in enumerate(self.logs):
             starts[f"start:vessel/P[{i}]"] = (0.0, START_PRESSURE * log.start[0])
@@ -148,7 +142,7 @@ class VesselProblem(Problem):
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""
         log = self.logs[index]
-        blow, values = self._blow_down(theta), self._values(theta)
+        blow, values = self._blow_down.at(theta), self._values(theta)
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
         far = FARTHEST
         start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, 1.0 / far, far)
@@ -175,21 +169,11 @@ class VesselProblem(Problem):
         units = {"vessel/P": "Pa", "vessel/T": "K"}
         return Rows(run, channel, time, label, nothing, names, sigma, units)
 
-    def _blow_down(self, theta: Theta) -> BlowDown:
-        active = switched_on(self.candidates, theta)
-        if active not in self._known:
-            model = self.model.with_effects(by_default(name) for name in active)
-            keys = [key for name in active for key in tuple(self.candidates[name].keys())]
-            self._known[active] = BlowDown(model, tuple(keys), tuple(self.figures))
-        return self._known[active]
-
     def _values(self, theta: Theta) -> dict[str, float]:
-        nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        values = {n: theta.get(n, nominal.get(n, 0.0)) for n in self._blow_down(theta).names}
-        far = FARTHEST  # beyond, nothing can be predicted
-        return {
-            n: float(np.clip(v, 1.0 / far, far)) if n in nominal else v for n, v in values.items()
-        }
+        values = self._blow_down.values(theta, self._blow_down.at(theta).names)
+        least, most = 1.0 / FARTHEST, FARTHEST  # beyond, nothing can be predicted
+        return {n: float(np.clip(v, least, most)) if n in self.figures else v
+                for n, v in values.items()}  # fmt: skip
 
 
 def vessel_problem(

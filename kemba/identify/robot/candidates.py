@@ -18,8 +18,6 @@ SHARED = ("supply_scale",)  # one supply feeds all legs
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")
-
-
 NONE = 1e-6  # a lag that is none [s]: far below a row
 ROBOT_CANDIDATE_SOFTNESS = 5e-5  # size of a ground's softness [m.N-1]
 SOFTEST = 1e-3  # largest softness of a ground [m.N-1]

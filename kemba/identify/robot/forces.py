@@ -22,7 +22,6 @@ from kemba.identify.robot.state import LinearisedState
 
 BODY = {"body z": 1, "body x": 0}  # place among the channels
 
-
 # A force of each channel that is neither small nor large.
 USUAL_FORCE_BODY = 3.0  # on the body [N]
 HIP = 0.5  # at a hip [N.m]

@@ -26,8 +26,6 @@ Columns = Mapping[str, Array]
 Change = Callable[[Columns], dict[str, Array]]
 OTHER_ZERO = "body/z counts from another zero"
 HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
-
-
 CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
 WINDOW = 0.05  # time in which a standing foot does not move [s]
 ROW = 0.005  # distance of the rows that are looked at [s]

@@ -1,4 +1,4 @@
-"""A function over many samples at once, in machine code."""
+"""Numeric functions of a robot model along measured motion, mapped over many samples at once."""
 
 from __future__ import annotations
 
@@ -103,8 +103,6 @@ class StateRunner:
 
 
 FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
-
-
 REACH = 4.0  # largest error, in sigmas: beyond chance
 LEAST = 0.2  # smallest value, as a share of the nominal one
 

@@ -1,7 +1,4 @@
-"""Unknown forces, and places that stand still, in the filter over robot logs.
-
-Forces are white noise of a spectral density: variance times seconds, N2.s or N2.m2.s.
-"""
+"""The reference: the motion along which a model is linearised, and how it is first found."""
 
 from __future__ import annotations
 
@@ -31,8 +28,6 @@ class ForceDensity:
 
 
 LOOSE = ForceDensity(0.05, 2e-3, 2e-3, 0.5)  # while the motion is smoothed: it follows the data
-
-
 QUIET = ForceDensity(1e-5, 1e-6, 1e-6, 1e-5)  # as good as none: all that is unknown is missing
 
 

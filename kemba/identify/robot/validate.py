@@ -1,4 +1,4 @@
-"""Usual mistakes in the commands of a robot log: valves swapped or inverted, torques turned.
+"""Robot logs that contradict themselves or any model: signs turned, valves mixed up, clocks apart.
 
 Torques enter the model's motion linearly, so that the residual of the other sign is known without
 another fit. Valves act through the air: each hypothesis about them is a log of its own.
