@@ -120,7 +120,7 @@ RULES = [
          lambda result, s, belief: result.best != belief.best),
     Rule("overclaimed", PARSIMONY + "overclaimed", lambda *_: False),
     Rule("little", PARSIMONY + "is_little", lambda *_: False),
-    Rule("idle", PARSIMONY + "is_idle", lambda *_: False),
+    Rule("idle", PARSIMONY + "is_unsupported", lambda *_: False),
     Rule("one part shows", "infer.cross_validation:one_part_shows", lambda *_: False),
     Rule("figures' share of a gain", "infer.cross_validation:figures_off", lambda *_: 0.0, always),
     Rule("ratio error", "infer.cross_validation:gained", plain_error, always),
@@ -212,7 +212,15 @@ def watched(acted: set[str]) -> Iterator[None]:
         yield
 
 
-LEARNING = ("recolour", "drifting", "relinearise", "rebuilt", "heard_as", "coarser", "in_detail")
+LEARNING = (
+    "recolour",
+    "drifting",
+    "relinearise",
+    "rebuilt",
+    "with_noise_of",
+    "coarser",
+    "in_detail",
+)
 PREDICTING = ("residual", "residuals", "jacobian")
 
 

@@ -120,7 +120,7 @@ class Answer:
         self.figures, self.machine = {}, {}
         self.error_after = self.error_before
 
-    def told_in(self, before: tuple[float, float]) -> None:
+    def rescaled_from(self, before: tuple[float, float]) -> None:
         """Tell the errors of steps and ranking by the scale of `error_before` and `error_after`,
         which were `before` so far, and the sentence anew."""
         old, new = before, (self.error_before, self.error_after)

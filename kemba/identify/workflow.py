@@ -38,7 +38,7 @@ PLANT = "plant"  # the shipped simulated robot, with physical chambers
 AROUND = 0.01  # s before and after a reading from which a speed is told
 
 
-def heard(problem: Problem) -> Problem:
+def with_learnt_noise(problem: Problem) -> Problem:
     """The problem under the noise of its own logs, learnt beside a flexible model."""
     return with_learnt_colour(problem, free_starts(problem))
 
@@ -48,10 +48,10 @@ def noise_ratio(problem: Problem, figures: Mapping[str, float] | None = None) ->
 
     `figures`: of the machine, as `Evidence.figures`; without them all are nominal.
     """
-    return error_ratio(heard(problem), known(problem, figures or {}))
+    return error_ratio(with_learnt_noise(problem), figures_felt(problem, figures or {}))
 
 
-def known(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
+def figures_felt(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
     """Those figures of a machine that these logs can feel."""
     return {name: value for name, value in figures.items() if name in problem.nuisance}
 
@@ -123,7 +123,7 @@ def discover_logs(
     fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
     found: Discovery | None = None
     try:
-        _apart(fitted, kept)
+        _check_disjoint(fitted, kept)
         fitted, kept, said = _kept_aside(fitted, kept)
         built = model_of(fitted, model)
         checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
@@ -176,7 +176,7 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
         answer.error_after = noise_ratio(written, answer.machine)
         if answer.error_after > answer.error_before:
             answer.drop_model()
-    answer.told_in(before)
+    answer.rescaled_from(before)
 
 
 def _evidence(
@@ -276,7 +276,7 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     write_json(out / "answer.json", data | {"base": reference(model)})
 
 
-def _apart(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
+def _check_disjoint(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
     """A held-out log must not be fitted as well."""
     both = {Path(t.meta["path"]).resolve() for t in fitted} & {
         Path(t.meta["path"]).resolve() for t in kept
@@ -317,10 +317,10 @@ def compare_read(
     tell("finding the motion in the logs")
     problem, _ = admitted(read, built)
     tell("learning the noise of the sensors")
-    problem = heard(problem)
+    problem = with_learnt_noise(problem)
     tell("comparing with the model")
     evidence = load_spec(model).evidence
-    figures = known(problem, evidence.figures) if evidence else {}
+    figures = figures_felt(problem, evidence.figures) if evidence else {}
     return compare(problem, model, [str(log.meta["path"]) for log in read], figures), problem
 
 

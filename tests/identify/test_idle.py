@@ -15,9 +15,9 @@ from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import figures_off, window_gain
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Belief, is_idle
+from kemba.identify.infer.selection import Selection, is_unsupported
 from kemba.identify.infer.spike_slab import NULL
-from kemba.identify.infer.verdict import doubts_about, verdict_on
+from kemba.identify.infer.verdict import caveats_of, verdict_on
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -32,7 +32,7 @@ def test_an_effect_that_is_not_there_gains_nothing_on_left_out_data(
     search = Search(bench_problem([bench_log(hidden, duration=1.2)], load_model(rig=True)))
     search.start()
     search.visit(FRICTION)
-    assert is_idle(search, FRICTION) == (force == 0.0)
+    assert is_unsupported(search, FRICTION) == (force == 0.0)
 
 
 @pytest.mark.parametrize("ended", [False, True])
@@ -44,8 +44,8 @@ def test_a_search_that_the_limit_ended_is_not_sure_of_a_sensor(
     search = Search(bench_problem([log], load_model(rig=True)))
     search.start()
     search.visit(scale)
-    doubts = doubts_about(search, Belief(scale), None, None, ended)
-    said = (verdict_on(scale, None, doubts), doubts.reasons, doubts.unsure)
+    caveats = caveats_of(search, Selection(scale), None, None, ended)
+    said = (verdict_on(scale, None, caveats), caveats.reasons, caveats.unsure)
     assert said == (("partly", (ENDED,), scale) if ended else ("missing", (), ()))
 
 
@@ -58,9 +58,9 @@ def test_of_several_effects_that_were_not_asked_one_by_one_none_is_sure(
     search.start()
     for answer in (FRICTION, both):
         search.visit(answer)
-    doubts = doubts_about(search, Belief(both), None, None, ended=search.late)
-    assert ENDED in doubts.reasons and doubts.unsure == both
-    assert doubts_about(search, Belief(FRICTION), None, None, ended=search.late).unsure == ()
+    caveats = caveats_of(search, Selection(both), None, None, ended=search.late)
+    assert ENDED in caveats.reasons and caveats.unsure == both
+    assert caveats_of(search, Selection(FRICTION), None, None, ended=search.late).unsure == ()
 
 
 def test_what_left_out_data_do_not_need_is_not_named() -> None:
@@ -87,4 +87,4 @@ def test_a_nominal_figure_far_off_speaks_for_an_effect(force: float, sigmas: flo
     search.visit(("kick",))
     assert abs(window_gain(search, ("kick",), NULL).nats) < 1.0
     assert figures_off(search, NULL) == pytest.approx(0.5 * sigmas**2, rel=0.1)
-    assert is_idle(search, ("kick",)) == (sigmas < 1.0)
+    assert is_unsupported(search, ("kick",)) == (sigmas < 1.0)

@@ -14,9 +14,9 @@ from kemba.files import write_json
 from kemba.identify.adopt import adopt_answer, adopted
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import HeldOut
-from kemba.identify.infer.joint import apart_between_runs, joint_fit
+from kemba.identify.infer.joint import conflicts_between_runs, joint_fit
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Belief, quoted
+from kemba.identify.infer.selection import Selection, quoted
 from kemba.model import load_spec, read_covariance
 
 BOTH = ("kick", "wave")
@@ -63,7 +63,7 @@ def test_runs_that_agree_are_not_called_apart() -> None:
         problem = Toy({"kick.a": 8.0}, seed)
         theta = {"kick.a": 8.0, "gain": 1.01}
         j = problem.jacobian(theta, ["kick.a", "gain"])
-        apart += len(list(apart_between_runs(problem, j, problem.residual(theta))))
+        apart += len(list(conflicts_between_runs(problem, j, problem.residual(theta))))
     assert apart <= 2
 
 
@@ -86,10 +86,10 @@ def test_an_effect_that_raises_the_quoted_error_does_not_stay() -> None:
     search.start()
     search.visit(BOTH)
     kept = HeldOut.beside(Toy({"kick.a": 8.0}, seed=9), search.problem)
-    belief, whole = quoted(search, Belief(BOTH, 0.0), BOTH, kept)
-    assert (belief.best, whole) == (("kick",), ("kick",))
-    same = quoted(search, Belief(BOTH, 0.0), BOTH, None)
-    assert same == (Belief(BOTH, 0.0), BOTH)
+    selection, whole = quoted(search, Selection(BOTH, 0.0), BOTH, kept)
+    assert (selection.best, whole) == (("kick",), ("kick",))
+    same = quoted(search, Selection(BOTH, 0.0), BOTH, None)
+    assert same == (Selection(BOTH, 0.0), BOTH)
 
 
 def answer_in(folder: Path, sure: list[str]) -> Path:

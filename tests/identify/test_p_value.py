@@ -15,7 +15,7 @@ from scipy.stats import kstest
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.infer.selection import Belief, believed
+from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.significance import NullTest, best_gain
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 
@@ -89,4 +89,4 @@ def test_what_chance_does_as_often_is_not_believed() -> None:
     """The search names an effect; every simulated log looks better."""
     found = search(a=3.0)
     p_value = NullTest(np.full(99, 50.0), (), 40).p_value(best_gain(found))
-    assert believed(found, ("a",), p_value) == Belief()
+    assert selected(found, ("a",), p_value) == Selection()

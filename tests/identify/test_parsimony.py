@@ -10,9 +10,15 @@ from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.infer.ranking import equivalents
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Belief, believed, likeliest_part, overclaimed, simplest
+from kemba.identify.infer.selection import (
+    Selection,
+    likeliest_part,
+    overclaimed,
+    selected,
+    simplest,
+)
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
-from kemba.identify.infer.verdict import doubts_about, verdict_on
+from kemba.identify.infer.verdict import caveats_of, verdict_on
 
 
 def windowed(truth: dict[str, float], seed: int = 0, artefact: float = 0.0) -> Toy:
@@ -49,8 +55,8 @@ def test_nats_that_do_not_last_name_no_effect() -> None:
 
 def test_an_effect_that_left_out_data_need_stays_however_small() -> None:
     search = searched(windowed({"kick.a": 9.0, "bend.a": 3.0}), "kick", "bend")
-    belief = Belief(("bend", "kick"), 0.01)
-    assert simplest(search, belief) == belief
+    selection = Selection(("bend", "kick"), 0.01)
+    assert simplest(search, selection) == selection
 
 
 @pytest.mark.parametrize(("beside", "named"), [(0.0, ("hum", "kick")), (4.0, ("kick",))])
@@ -60,17 +66,17 @@ def test_an_effect_is_small_beside_what_the_answer_leaves(beside: float, named: 
     problem.measured = problem.measured + beside * np.sin(200 * problem._time)
     search = searched(problem, "kick", "hum")
     assert left_out(search, ("hum", "kick"), ("kick",)).nats > 50.0
-    assert simplest(search, Belief(("hum", "kick"), 0.01)).best == named
+    assert simplest(search, Selection(("hum", "kick"), 0.01)).best == named
 
 
 def test_a_larger_answer_with_an_effect_that_was_left_out_is_no_rival() -> None:
     problem = Toy({"kick.a": 9.0, "hum.a": 0.5, "wave.a": 3.0})
     problem.measured = problem.measured + 4.0 * np.sin(200 * problem._time)
     search = searched(problem, "kick", "hum", "wave")
-    found = simplest(search, Belief(("hum", "kick"), 0.01))
+    found = simplest(search, Selection(("hum", "kick"), 0.01))
     assert found.best == ("kick",) and ("hum", "kick", "wave") in found.dismissed
     search.visit(("kick", "wave"))
-    earlier = Belief(("hum", "kick"), 0.01, frozenset({("hum", "kick", "wave")}))
+    earlier = Selection(("hum", "kick"), 0.01, frozenset({("hum", "kick", "wave")}))
     assert ("kick", "wave") in simplest(search, earlier).dismissed
 
 
@@ -90,7 +96,7 @@ def test_parts_that_were_refitted_on_the_way_up_count(monkeypatch: pytest.Monkey
     monkeypatch.setattr("kemba.identify.infer.selection._thin", lambda search, best: None)
     many = ("bend", "hum", "kick", "wave")
     search = searched(windowed({"kick.a": 9.0}), "kick", "bend", "hum", "wave")
-    assert simplest(search, Belief(many, 0.01)).best == ("kick",)
+    assert simplest(search, Selection(many, 0.01)).best == ("kick",)
 
 
 def test_an_answer_of_many_effects_is_compared_with_its_parts_and_not_with_nothing() -> None:
@@ -116,7 +122,7 @@ def test_effects_that_do_not_pay_leave_an_answer_one_by_one(
     search.start()
     search.visit(many)
     monkeypatch.setattr("kemba.identify.infer.selection.left_out", alone_pays)
-    assert believed(search, many, p_value=0.0).best == ("kick",)
+    assert selected(search, many, p_value=0.0).best == ("kick",)
 
 
 def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
@@ -127,13 +133,13 @@ def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
     problem.measured = problem.measured - 0.3 * flicker
     search = searched(problem, "drag", "twin")
     best = ("drag", "twin")
-    found = simplest(search, Belief(best, 0.01))
+    found = simplest(search, Selection(best, 0.01))
     assert found.best == ("drag",) and found.rivals == (("twin",),)
     assert best in found.dismissed and found.remarks
     nats = search.points["drag",].log_evidence - search.points["twin",].log_evidence
     assert nats > 10.0
-    doubts = doubts_about(search, found, None, None)
-    assert verdict_on(found.best, None, doubts) == "partly"
+    caveats = caveats_of(search, found, None, None)
+    assert verdict_on(found.best, None, caveats) == "partly"
     assert equivalents(search, found, "drag") == ("twin",)
 
 
@@ -143,5 +149,5 @@ def test_a_small_gain_that_lasts_stays_though_it_is_within_its_scatter(seed: int
     search = searched(windowed({"kick.a": 9.0, "bend.a": 0.15}, seed), "kick", "bend")
     gain = left_out(search, ("bend", "kick"), ("kick",))
     assert 0.0 < gain.nats < gain.error
-    belief = Belief(("bend", "kick"), 0.01)
-    assert simplest(search, belief) == belief
+    selection = Selection(("bend", "kick"), 0.01)
+    assert simplest(search, selection) == selection

@@ -11,7 +11,7 @@ from toy_problem import Toy
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import CrossValidationSettings, gained, window_powers
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import is_idle
+from kemba.identify.infer.selection import is_unsupported
 
 
 def test_parts_that_gain_alike_have_the_usual_standard_error() -> None:
@@ -59,7 +59,7 @@ def test_whole_runs_cannot_confirm_what_one_alone_shows(alone: float, idle: bool
     search.start()
     search.visit(("hum",))
     with patch.multiple(CrossValidationSettings, alone=alone):
-        assert is_idle(search, ("hum",)) == idle
+        assert is_unsupported(search, ("hum",)) == idle
 
 
 def test_what_one_run_alone_shows_is_not_found_where_it_is_not() -> None:

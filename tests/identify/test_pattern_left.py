@@ -10,7 +10,7 @@ import pytest
 from kemba.identify.compare.force_profiles import ForceProfile
 from kemba.identify.infer import residual as rest
 from kemba.identify.infer import verdict
-from kemba.identify.infer.selection import Belief
+from kemba.identify.infer.selection import Selection
 
 
 def left(monkeypatch: pytest.MonkeyPatch, gain: float, force: float, error: float = 1.2) -> str:
@@ -56,5 +56,5 @@ def test_half_is_asked_where_more_is_left_than_a_whole_answer_may_leave(
     monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
     monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "a force after extend")
     monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
-    doubts = verdict.doubts_about(SimpleNamespace(), Belief(best), None, None)  # type: ignore[arg-type]
-    assert verdict.verdict_on(best, None, doubts) == said
+    caveats = verdict.caveats_of(SimpleNamespace(), Selection(best), None, None)  # type: ignore[arg-type]
+    assert verdict.verdict_on(best, None, caveats) == said

@@ -13,9 +13,9 @@ from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.infer.ranking import values
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Belief, material
+from kemba.identify.infer.selection import Selection, material
 from kemba.identify.infer.spike_slab import NULL, SpikeSlabSettings, probabilities
-from kemba.identify.infer.verdict import doubts_about, verdict_on
+from kemba.identify.infer.verdict import caveats_of, verdict_on
 from kemba.plotting.study.discovery import plot_steps
 
 
@@ -124,7 +124,7 @@ def test_an_answer_that_leaves_much_of_the_error_is_not_the_whole(
     problem = Toy({"kick.a": size}, seed=4)
     rng = np.random.default_rng(5)
     problem.measured += np.sqrt(noise**2 - 1.0) * rng.standard_normal(len(problem.measured))
-    found = doubts_about(searched(problem), Belief(("kick",)), None, None)
+    found = caveats_of(searched(problem), Selection(("kick",)), None, None)
     assert verdict_on(("kick",), None, found) == verdict
     if verdict != "missing":
         (doubt,) = found.reasons
@@ -143,7 +143,7 @@ def test_a_significant_error_that_nothing_explains_is_not_called_small(
     problem.measured += np.sqrt(noise**2 - 1.0) * np.random.default_rng(5).standard_normal(
         len(problem.measured)
     )
-    found = doubts_about(searched(problem), Belief(NULL, p_value), None, None)
+    found = caveats_of(searched(problem), Selection(NULL, p_value), None, None)
     assert verdict_on(NULL, None, found) == verdict
 
 

@@ -14,7 +14,7 @@ from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
-from kemba.identify.problem.candidates import Compiled, nominal_figures
+from kemba.identify.problem.candidates import CompiledModels, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.mechanism import Cylinder
@@ -23,7 +23,7 @@ from kemba.model.model import Model
 SENT_LATE = "sent:late"  # nuisance of slow logs [s]: by how much all commands were sent later
 
 
-class BenchPredictor(Compiled[RigModel]):
+class BenchPredictor(CompiledModels[RigModel]):
     """Rigs of one model.
 
     `exact`: what a late force sensor shows is computed at its own times, not read off between rows.

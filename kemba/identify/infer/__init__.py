@@ -8,7 +8,7 @@
    while the evidence grows. Where the motion depends on the model, it is found again in between.
 4. `significance`: a bootstrap of the whole search on logs in which nothing is missing.
 5. `cross_validation`, `selection`: an effect stays where data that the fit has not seen are
-   predicted better by more than one standard error; the fewest such effects are believed.
+   predicted better by more than one standard error; the fewest such effects are selected.
 6. `formula`, `residual`: terms beyond the catalogue, and what an answer leaves.
 7. `joint`: all effects and nominal figures at one joint estimate, with intervals.
 8. `ranking`, `verdict`: what is said. `structure`: the same for a model with another structure.

@@ -53,11 +53,11 @@ class Gain:
 def one_part_shows(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> bool:
     """Whether one part of the logs alone can tell two hypotheses apart, so that what remains
     without that part says nothing of it."""
-    apart = _apart(search, hypothesis, against)
-    return bool(apart.max() > CrossValidationSettings.alone * apart.sum())
+    distances = _distances(search, hypothesis, against)
+    return bool(distances.max() > CrossValidationSettings.alone * distances.sum())
 
 
-def _apart(
+def _distances(
     search: Search, hypothesis: Hypothesis, against: Hypothesis, fine: bool = False
 ) -> Array:
     """How far apart the predictions of two hypotheses are in each part of the logs (p,): sum of
@@ -80,14 +80,14 @@ def left_out(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL)
     fine = one_part_shows(search, hypothesis, against)
     points = (search.points[h] for h in (hypothesis, against))
     ours, theirs = (_powers(search, point, point.linear, fine) for point in points)
-    return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
+    return gained(0.5 * (theirs - ours), _distances(search, hypothesis, against, fine))
 
 
 def window_gain(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> Gain:
     """The same of the rows summed over aggregation windows."""
     fine = one_part_shows(search, hypothesis, against)
     ours, theirs = (window_powers(search, h, fine) for h in (hypothesis, against))
-    return gained(0.5 * (theirs - ours), _apart(search, hypothesis, against, fine))
+    return gained(0.5 * (theirs - ours), _distances(search, hypothesis, against, fine))
 
 
 def gain_over_nothing(search: Search, hypothesis: Hypothesis) -> Gain:
@@ -109,15 +109,15 @@ def figures_off(search: Search, hypothesis: Hypothesis) -> float:
     return 0.5 * float(np.sum(off[search.base.ranker(linear).nuisance] ** 2))
 
 
-def gained(gains: Array, apart: Array) -> Gain:
+def gained(gains: Array, distances: Array) -> Gain:
     """Sum of gains (p,) [nats] of parts, and its standard error.
 
-    That of a ratio estimator (Cochran 1977, 6.4): parts are expected to gain as predictions are
-    `apart` (p,) in them. Where all gain alike, it is the usual standard error; a swing that alone
-    shows a motor's torque is no scatter beside jumps that cannot.
+    That of a ratio estimator (Cochran 1977, 6.4): parts are expected to gain by the `distances`
+    (p,) of predictions in them. Where all gain alike, it is the usual standard error; a swing that
+    alone shows a motor's torque is no scatter beside jumps that cannot.
     """
     total, count = float(gains.sum()), len(gains)
-    share = apart / apart.sum() if apart.sum() > 0 else np.full(count, 1.0 / count)
+    share = distances / distances.sum() if distances.sum() > 0 else np.full(count, 1.0 / count)
     scatter = float(np.sum((gains - share * total) ** 2))
     return Gain(total, float(np.sqrt(count / (count - 1) * scatter)) if count > 1 else 0.0)
 
@@ -205,7 +205,7 @@ class HeldOut:
     @classmethod
     def beside(cls, logs: Problem, fitted: Problem) -> HeldOut:
         """`logs` as they are judged beside the fitted ones."""
-        heard = logs.heard_as(fitted)
+        heard = logs.with_noise_of(fitted)
         return cls(heard, heard.relinearise(fitted.base) if fitted.base else heard)
 
 
@@ -223,7 +223,7 @@ def error_as_it_is(search: Search, kept: HeldOut | None = None) -> float:
     """Error of the model as it is along the motion that it makes of the data itself, as `compare`
     tells it; without logs `kept` of the fitted ones."""
     own = search.own or (search.problem, search.points[NULL].fit.theta)
-    return _ratio(search, kept.plain if kept else own[0].heard_as(search.problem), own[1])
+    return _ratio(search, kept.plain if kept else own[0].with_noise_of(search.problem), own[1])
 
 
 def _ratio(search: Search, judge: Problem, theta: Theta) -> float:

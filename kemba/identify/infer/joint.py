@@ -69,7 +69,7 @@ def half_widths(labels: Labels, j: Array, r: Array, h: Array) -> Array:
     return np.asarray(np.sqrt(np.diag(covariance)) * stdtrit(freedom, 0.975))
 
 
-def apart_between_runs(
+def conflicts_between_runs(
     problem: Problem, j: Array, r: Array
 ) -> Iterator[tuple[int, tuple[float, float]]]:
     """Parameters on which runs disagree, and how far from the fit what they say begins and ends.
@@ -99,14 +99,14 @@ def apart_between_runs(
 
 
 # of what a rig brings along: the figure that its logs tell better than any drawing
-TOLD = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
+RIG_FIGURES = ("measured_chambers.gain", "drive_axis.J", "vessel_chamber.a")
 LOOSE = 0.5  # prior sigma of its factor: as good as none
 ALIKE = 0.998  # cosine of slopes from which two figures are one
 FAR = 3.0  # tolerances by which a figure is off that is told
 ROUNDS = 2  # times that the fit begins again with slopes along the figures taken anew
 
 # a share of another structure, and factors of a table, which are no parameters by themselves
-UNTOLD = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
+NOT_WRITTEN = tuple(f"orifice_chamber.{name}" for name in ("a", "level", "gauge"))
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ class JointFit:
         there are none."""
         tables = {n for n, value in self.figures.items() if "[" in n or isinstance(value, tuple)}
         told = [name.replace(f"{ORIFICE}.", "orifice_chamber.") for name in self.names]
-        keep = [i for i, name in enumerate(told) if name not in {*UNTOLD, *tables}]
+        keep = [i for i, name in enumerate(told) if name not in {*NOT_WRITTEN, *tables}]
         rows = self.covariance[np.ix_(keep, keep)].tolist()
         return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows))) if rows else None
 
@@ -181,10 +181,10 @@ def single_figures(problem: Problem) -> tuple[str, ...]:
     return tuple(n for n in others if n.partition(":")[0] in kinds or n.startswith(LINK))
 
 
-def told_by_figures(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Hypothesis:
+def without_figure_aliases(problem: Problem, hypothesis: Hypothesis, start: Theta) -> Hypothesis:
     """The hypothesis without faults of sensors that look like a figure which the fit leaves free: a
     force sensor's scale and the bore's gain are one in logs of a cylinder."""
-    figures = [n for n in own_figures(problem) if n in TOLD]
+    figures = [n for n in own_figures(problem) if n in RIG_FIGURES]
     faults = [e for e in hypothesis if problem.candidates[e].sensor]
     if not figures or not faults or len(hypothesis) < 2:
         return hypothesis
@@ -204,7 +204,7 @@ def _fitted(
     starts = (n for n in problem.nuisance if n.startswith(START))
     free = (*own, *single_figures(problem), *starts)
     theta = {k: v for k, v in start.items() if k in keys or k in free}
-    loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in TOLD}
+    loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in RIG_FIGURES}
     candidates = problem.candidates | {
         name: _whole(problem.candidates[name]) for name in problem.structures & set(hypothesis)
     }
@@ -254,7 +254,7 @@ def _judged(
     low, high = value - reach, value + reach
     remarks = [_far(problem, names[i], value[i], low[i], high[i]) for i in range(len(keys), count)]
     remarks = [text for text in remarks if text]
-    for i, ends in apart_between_runs(problem, j[:, :count], r):
+    for i, ends in conflicts_between_runs(problem, j[:, :count], r):
         apart = value[i] + scale[i] * np.array(ends)
         if apart.min() < low[i] or apart.max() > high[i]:
             low[i], high[i] = min(low[i], apart.min()), max(high[i], apart.max())
@@ -308,7 +308,7 @@ def _as_written(
 def _far(problem: Problem, name: str, value: float, low: float, high: float) -> str:
     """That a figure of a rig differs from the one given by more than it may; empty where not."""
     model = getattr(problem, "model", None)
-    if name not in TOLD or model is None:
+    if name not in RIG_FIGURES or model is None:
         return ""
     effect, figure = name.rsplit(".", 1)
     if abs(value - 1.0) < FAR * model.effect(effect).tolerances().get(figure, 0.0):

@@ -13,7 +13,7 @@ from kemba.identify.infer.joint import JointFit
 from kemba.identify.infer.linear import is_shape
 from kemba.identify.infer.null_model import within_bounds
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Belief, strength
+from kemba.identify.infer.selection import Selection, strength
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, SpikeSlabSettings, share_of
 from kemba.identify.problem.types import Array, Candidate, Parameter
 
@@ -28,16 +28,16 @@ DOUBTED = 0.5
 
 def ranked(
     search: Search,
-    belief: Belief,
+    selection: Selection,
     kept: HeldOut | None,
     whole: Hypothesis = NULL,
     joint: JointFit | None = None,
 ) -> list[Ranked]:
-    """The effects in order of probability; those of the answer that is believed first, then the
+    """The effects in order of probability; those of the selected hypothesis first, then the
     others of the `whole` that is written, with what the `joint` fit says of them."""
-    problem, best = search.problem, belief.best
+    problem, best = search.problem, selection.best
     probability = (
-        search.probabilities(belief.dismissed) if best else _doubted(search.probabilities())
+        search.probabilities(selection.dismissed) if best else _doubted(search.probabilities())
     )
     shares = share_of(probability, problem.candidates)
     order = sorted(
@@ -59,7 +59,7 @@ def ranked(
                 joint.values(problem.candidates[effect])
                 if joint is not None and written
                 else values(search, hypothesis, effect),
-                equivalents(search, belief, effect) if effect in best else (),
+                equivalents(search, selection, effect) if effect in best else (),
                 before,
                 error(search, hypothesis, kept),
                 left_out(search, hypothesis).nats,
@@ -84,15 +84,15 @@ def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]
     return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
 
 
-def equivalents(search: Search, belief: Belief, effect: str) -> tuple[str, ...]:
+def equivalents(search: Search, selection: Selection, effect: str) -> tuple[str, ...]:
     """Effects that could stand in this one's place in the answer: they explain the data, or predict
     left-out data, as well."""
-    hypothesis = belief.best
+    hypothesis = selection.best
     own, same = search.points[hypothesis].log_evidence, SAME
     near = {h for h, p in search.points.items() if own - p.log_evidence < same}
     rest = set(hypothesis) - {effect}
     found: set[str] = set()
-    for other in (near - belief.dismissed) | set(belief.rivals):
+    for other in (near - selection.dismissed) | set(selection.rivals):
         swapped = set(other) - rest
         if len(other) == len(hypothesis) and rest <= set(other) and swapped != {effect}:
             found |= swapped

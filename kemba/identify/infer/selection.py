@@ -1,4 +1,4 @@
-"""What is believed of a search: the fewest effects that predict left-out data as well as any more.
+"""Model selection: the fewest effects that predict left-out data as well as any more.
 
 Evidence counts every row as new. The motion is read from the same noisy rows that judge it, so that
 a row's noise is in the prediction as well; from thousands of rows a wrong effect may gain many nats
@@ -42,12 +42,12 @@ SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class Belief:
-    """The hypothesis that is believed, and the p-value of nothing.
+class Selection:
+    """The hypothesis that is selected, and the p-value of nothing.
 
     `dismissed`: hypotheses that are too small, refuted, or no better than a smaller one. `rivals`:
     others, with as many effects, that predict left-out data as well. `remarks`: what was left out.
-    `idle`: all of it was, since left-out data gain nothing by it.
+    `unsupported`: all of it was, since left-out data gain nothing by it.
     """
 
     best: Hypothesis = NULL
@@ -55,20 +55,20 @@ class Belief:
     dismissed: frozenset[Hypothesis] = frozenset()
     rivals: tuple[Hypothesis, ...] = ()
     remarks: tuple[str, ...] = ()
-    idle: bool = False
+    unsupported: bool = False
 
-    def without(self, hypothesis: Hypothesis, best: Hypothesis) -> Belief:
+    def without(self, hypothesis: Hypothesis, best: Hypothesis) -> Selection:
         """The same with `hypothesis` dismissed for `best`."""
         return replace(self, best=best, dismissed=self.dismissed | {hypothesis}, rivals=())
 
 
-def simplest(search: Search, belief: Belief) -> Belief:
-    """The belief with the fewest effects that left-out data need.
+def simplest(search: Search, selection: Selection) -> Selection:
+    """The selection with the fewest effects that left-out data need.
 
     Among all parts of the answer that were refitted, on the way up to it or in `_thin`. A last
     effect stays: whether there is any is asked by the bootstrap.
     """
-    best = belief.best
+    best = selection.best
     _thin(search, best)
     known = _known_parts(search, best)
     least = min(known, key=lambda h: window_powers(search, h).sum())
@@ -78,11 +78,11 @@ def simplest(search: Search, belief: Belief) -> Belief:
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
     if chosen == best:
-        return belief
+        return selection
     # the evidence proposed this one as a part of the best only: alone it need not be the likeliest
     count, parts = len(search.problem.candidates), _known_parts(search, chosen)
     chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
-    return _instead(search, belief, chosen)
+    return _instead(search, selection, chosen)
 
 
 def _thin(search: Search, best: Hypothesis) -> None:
@@ -135,13 +135,13 @@ def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool
     return rows.nats <= 0 or windows.nats + windows.error < rows.nats
 
 
-def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
-    """The belief in a smaller hypothesis. Others with as many effects that predict as well, within
-    one standard error, are its rivals, whatever their evidence is, which was not believed of the
+def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Selection:
+    """A smaller hypothesis selected. Others with as many effects that predict as well, within
+    one standard error, are its rivals, whatever their evidence is, which did not count for the
     larger one either; those that predict worse are dismissed, and so are larger ones that predict
     no better, or that add an effect which was left out."""
-    rivals, dismissed = [], {belief.best, *belief.dismissed}
-    dropped = set(belief.best).union(*belief.dismissed) - set(chosen)
+    rivals, dismissed = [], {selection.best, *selection.dismissed}
+    dropped = set(selection.best).union(*selection.dismissed) - set(chosen)
     for other in search.points:
         if len(other) < len(chosen) or other == chosen:
             continue
@@ -151,17 +151,17 @@ def _instead(search: Search, belief: Belief, chosen: Hypothesis) -> Belief:
             set(chosen) < set(other) and dropped & set(other)
         ):
             dismissed.add(other)
-    remark = _remark(search, belief.best, chosen)
+    remark = _remark(search, selection.best, chosen)
     return replace(
-        belief,
+        selection,
         best=chosen,
         dismissed=frozenset(dismissed),
         rivals=tuple(sorted(rivals)),
-        remarks=(*belief.remarks, remark),
+        remarks=(*selection.remarks, remark),
     )
 
 
-def is_idle(search: Search, best: Hypothesis) -> bool:
+def is_unsupported(search: Search, best: Hypothesis) -> bool:
     """Whether left-out data, summed over aggregation windows, and nominal figures gain no more by
     an answer than their scatter. Its p-value counts rows, whose noise may be slower than it is
     taken to be."""
@@ -169,14 +169,14 @@ def is_idle(search: Search, best: Hypothesis) -> bool:
     return not gain.pays or gain.nats < BootstrapSettings.least
 
 
-def none_of(belief: Belief) -> Belief:
-    """The belief in nothing, where the best hypothesis is idle."""
+def nothing_selected(selection: Selection) -> Selection:
+    """Nothing, where left-out data do not support the best hypothesis."""
     remark = (
-        f"{' and '.join(belief.best)} would fit these readings better, but left-out data are "
+        f"{' and '.join(selection.best)} would fit these readings better, but left-out data are "
         "predicted as well without: it may be chance"
     )
-    none = belief.without(belief.best, NULL)
-    return replace(none, remarks=(*belief.remarks, remark), idle=True)
+    none = selection.without(selection.best, NULL)
+    return replace(none, remarks=(*selection.remarks, remark), unsupported=True)
 
 
 def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
@@ -213,30 +213,30 @@ def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
     )
 
 
-def believed(search: Search, best: Hypothesis, p_value: float) -> Belief:
+def selected(search: Search, best: Hypothesis, p_value: float) -> Selection:
     """The best hypothesis without what is not significant, too small, refuted by left-out data or
     of no use there."""
     if not best or p_value > DiscoverSettings.significant:
-        return Belief(NULL, p_value)
-    belief = Belief(best, p_value)
-    while belief.best:
-        best = belief.best
-        grave = material(search, best)
-        if grave != best:
-            belief = belief.without(best, grave)
-            if grave:
-                search.visit(grave)
+        return Selection(NULL, p_value)
+    selection = Selection(best, p_value)
+    while selection.best:
+        best = selection.best
+        large = material(search, best)
+        if large != best:
+            selection = selection.without(best, large)
+            if large:
+                search.visit(large)
             continue
         against = likeliest_part(search, best)
         if is_refuted(search, best, against):
-            belief = belief.without(best, against)
+            selection = selection.without(best, against)
             continue
-        simpler = simplest(search, belief)
+        simpler = simplest(search, selection)
         if simpler.best != best:
-            belief = simpler
+            selection = simpler
         else:
-            return none_of(simpler) if is_idle(search, best) else simpler
-    return belief
+            return nothing_selected(simpler) if is_unsupported(search, best) else simpler
+    return selection
 
 
 def is_refuted(search: Search, hypothesis: Hypothesis, against: Hypothesis) -> bool:
@@ -276,8 +276,8 @@ SAME = 2e-3  # share of an error by which it must change to have changed: roundi
 
 
 def predictive(search: Search, best: Hypothesis, likeliest: Hypothesis) -> Hypothesis:
-    """The believed effects, and those that help to predict folds of the fitted logs: of the
-    likeliest hypothesis, and others for which there is strong evidence beside the believed ones."""
+    """The selected effects, and those that help to predict folds of the fitted logs: of the
+    likeliest hypothesis, and others for which there is strong evidence beside the selected ones."""
     told = search.points[best].log_evidence + STRONG
     larger = [h for h in search.points if set(best) < set(h) and len(h) == len(best) + 1]
     more = [e for h in larger if search.points[h].log_evidence > told for e in h if not is_fault(e)]
@@ -296,13 +296,13 @@ def predictive(search: Search, best: Hypothesis, likeliest: Hypothesis) -> Hypot
 
 
 def quoted(
-    search: Search, belief: Belief, whole: Hypothesis, kept: HeldOut | None
-) -> tuple[Belief, Hypothesis]:
-    """Belief and written effects without those that raise the error on logs `kept` for quoting;
-    one that leaves it as it was is written, but not believed. All at their joint estimates."""
-    best = tuple(e for e in belief.best if e in whole)
+    search: Search, selection: Selection, whole: Hypothesis, kept: HeldOut | None
+) -> tuple[Selection, Hypothesis]:
+    """Selection and written effects without those that raise the error on logs `kept` for quoting;
+    one that leaves it as it was is written, but not selected. All at their joint estimates."""
+    best = tuple(e for e in selection.best if e in whole)
     if kept is None or not whole:
-        return (replace(belief, best=best) if best else belief), whole
+        return (replace(selection, best=best) if best else selection), whole
     theta = _joint(search, whole)
     judge = kept.found.coarser(theta)  # one noise for all, what the whole lacks included
     there = error_ratio(judge, theta)
@@ -315,9 +315,11 @@ def quoted(
             best = tuple(e for e in best if e != effect)
         if without < there * (1.0 - SAME):
             whole, there = part, without
-    if best == belief.best:
-        return belief, whole
-    return (replace(belief, best=best) if best else none_of(belief)), whole if best else ()
+    if best == selection.best:
+        return selection, whole
+    return (
+        replace(selection, best=best) if best else nothing_selected(selection)
+    ), whole if best else ()
 
 
 def _joint(search: Search, hypothesis: Hypothesis) -> dict[str, float]:

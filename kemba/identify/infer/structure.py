@@ -42,7 +42,7 @@ class Rebuilt:
     nats: float = 0.0
 
 
-def settled(problem: Problem) -> tuple[Problem, dict[str, float]]:
+def fitted_figures(problem: Problem) -> tuple[Problem, dict[str, float]]:
     """The problem along the motion that its best figures make of the data, and these figures."""
     free = tuple(problem.nuisance)
     best, figures, least, found = problem, dict[str, float](), np.inf, dict[str, float]()
@@ -66,7 +66,7 @@ def ahead(problem: Problem, theta: Mapping[str, float], error: float) -> Rebuilt
     plain = problem.recolour(None)
     if not problem.structures or error_ratio(plain, theta) <= error:
         return None
-    built, figures = settled(plain.rebuilt(theta))
+    built, figures = fitted_figures(plain.rebuilt(theta))
     rows = min(len(plain.residual({})), len(built.residual(figures)))
     nats = rows * (_unexplained(plain, {}) - _unexplained(built, figures))
     return Rebuilt(built, figures, nats) if nats > AHEAD else None

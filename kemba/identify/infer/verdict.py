@@ -10,14 +10,14 @@ from kemba.identify.infer.cross_validation import HeldOut, error
 from kemba.identify.infer.formula import Formula
 from kemba.identify.infer.residual import Drift, pattern_left, unfinished
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Belief
+from kemba.identify.infer.selection import Selection
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import excess
 from kemba.identify.problem.sensor_faults import is_fault
 
 
 @dataclass(frozen=True)
-class Doubts:
+class Caveats:
     """Why an answer is not complete. `part`: it explains enough of the error to be a part;
     `unsure`: effects of it that are likely at best, whatever their probability."""
 
@@ -26,12 +26,16 @@ class Doubts:
     unsure: Hypothesis = ()
 
 
-def doubts_about(
-    search: Search, belief: Belief, drift: Drift | None, kept: HeldOut | None, ended: bool = False
-) -> Doubts:
+def caveats_of(
+    search: Search,
+    selection: Selection,
+    drift: Drift | None,
+    kept: HeldOut | None,
+    ended: bool = False,
+) -> Caveats:
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
-    settings, reasons, best = VerdictSettings, [], belief.best
+    settings, reasons, best = VerdictSettings, [], selection.best
     before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part
     if drift is not None:
@@ -52,19 +56,19 @@ def doubts_about(
         reasons.append(
             f"{enumerated(best)} fits best, but leaves an error of {after:.3g} times the noise"
         )
-    if not best and belief.p_value <= settings.unexplained and before > settings.whole:
+    if not best and selection.p_value <= settings.unexplained and before > settings.whole:
         reasons.append(
             f"the model as it is leaves an error of {before:.3g} times the noise, and no effect "
             "explains enough of it"
         )
-    if belief.rivals:
-        others = ", ".join(" + ".join(h) for h in belief.rivals)
+    if selection.rivals:
+        others = ", ".join(" + ".join(h) for h in selection.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
     unsure = unasked(search, best) if ended else ()
     if unsure and not reasons:
-        return Doubts((ENDED,), part=True, unsure=unsure)
-    return Doubts(tuple(reasons), part, unsure)
+        return Caveats((ENDED,), part=True, unsure=unsure)
+    return Caveats(tuple(reasons), part, unsure)
 
 
 def unasked(search: Search, best: Hypothesis) -> Hypothesis:
@@ -74,13 +78,13 @@ def unasked(search: Search, best: Hypothesis) -> Hypothesis:
     return tuple(e for e in best if is_fault(e)) if asked_smaller else best
 
 
-def verdict_on(best: Hypothesis, formula: Formula | None, doubts: Doubts) -> Verdict:
+def verdict_on(best: Hypothesis, formula: Formula | None, caveats: Caveats) -> Verdict:
     """Missing, where the answer is complete; partly, where it explains enough of the error."""
-    if formula is not None or (doubts.reasons and not doubts.part):
+    if formula is not None or (caveats.reasons and not caveats.part):
         return "unknown"
     if not best:
         return "nothing"
-    return "partly" if doubts.reasons else "missing"
+    return "partly" if caveats.reasons else "missing"
 
 
 def is_sure(ranked: Ranked) -> bool:

@@ -97,7 +97,7 @@ def switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str,
     )
 
 
-class Compiled(Generic[T]):
+class CompiledModels(Generic[T]):
     """A model compiled with the effects that theta switches on, each set of effects once.
 
     `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.

@@ -191,7 +191,7 @@ class Problem(ABC):
         sharper the noise, the larger. Default: zero, for noise that stays as it is."""
         return 0.0
 
-    def heard_as(self, other: Problem) -> Self:
+    def with_noise_of(self, other: Problem) -> Self:
         """This problem with the noise colour that `other`, logs of the same sensors, has learnt."""
         return self
 

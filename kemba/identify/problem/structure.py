@@ -68,7 +68,7 @@ class OrificeShare(OrificeChamber):
 
     def evaluate(self, at: At) -> Contribution:
         scaled = self.bind({"gauge": tuple(self.level * g for g in self.gauge)})
-        other = OrificeChamber.evaluate(scaled, _Apart(at))  # type: ignore[arg-type]
+        other = OrificeChamber.evaluate(scaled, _OwnPressures(at))  # type: ignore[arg-type]
         own = at.F_e - at.F_r + at.F_mode
         return Contribution(
             effort={"piston": self.a * (other.effort["piston"] - own)},
@@ -76,7 +76,7 @@ class OrificeShare(OrificeChamber):
         )
 
 
-class _Apart:
+class _OwnPressures:
     """`At` in which the chambers' pressures are those of the share."""
 
     def __init__(self, at: At) -> None:

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-from kemba.identify.infer.joint import TOLD, apart_between_runs, divisions, half_widths
+from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divisions, half_widths
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import check_logs
@@ -93,7 +93,10 @@ def fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     names = [
         name
         for name, (_, value) in started.parameters.items()
-        if value and (name in TOLD or name.split(".")[0] not in {t.split(".")[0] for t in TOLD})
+        if value
+        and (
+            name in RIG_FIGURES or name.split(".")[0] not in {t.split(".")[0] for t in RIG_FIGURES}
+        )
     ]
     make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
@@ -144,7 +147,7 @@ def _fit(
         raise KembaError(worst, "cannot be told from the other figures by these logs", hint=hint)
     h = np.linalg.inv(j.T @ j + np.diag(known))
     widths = np.max([half_widths(d, j, r, h) for d in divisions(problem)], axis=0)
-    runs = dict(apart_between_runs(problem, j[:, : len(names)], r))
+    runs = dict(conflicts_between_runs(problem, j[:, : len(names)], r))
     figures = []
     for i, name in enumerate(names):
         ends = [-widths[i], widths[i], *runs.get(i, ())]

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.effects.series import Series
-from kemba.identify.problem.candidates import Compiled, nominal_figures
+from kemba.identify.problem.candidates import CompiledModels, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, Filtered, RigLog
@@ -108,7 +108,7 @@ TRAVEL = 0.5  # prior sigma of the travel until they slide, as a share of it
 LEAST = 0.05  # smallest force of a motor over that of the log
 
 
-class Predictor(Compiled[Balance]):
+class Predictor(CompiledModels[Balance]):
     """Balances of one model, and what its sensors make of them."""
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:

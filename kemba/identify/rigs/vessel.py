@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.effects.series import Series
 from kemba.identify.infer.refit import RefitSettings
-from kemba.identify.problem.candidates import Compiled, nominal_figures, sensor_candidates
+from kemba.identify.problem.candidates import CompiledModels, nominal_figures, sensor_candidates
 from kemba.identify.problem.problem import Problem, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Rows, Theta
@@ -123,7 +123,7 @@ class VesselProblem(Problem):
             self.candidates[name] = fault
         self.sensors, self.figures = SensorFaults(model.effects), nominal_figures(model)
         self.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
-        self._blow_down = Compiled(model, self.candidates, self.figures, BlowDown)
+        self._blow_down = CompiledModels(model, self.candidates, self.figures, BlowDown)
         starts = {}
         for i, log in enumerate(self.logs):
             starts[f"start:vessel/P[{i}]"] = (0.0, START_PRESSURE * log.start[0])

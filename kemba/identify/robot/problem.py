@@ -170,7 +170,7 @@ class RobotProblem(Problem):
         """That of the innovations' whitener."""
         return float(np.log(np.diagonal(self.state.gain.whitener, 0, 2, 3)[self.state.mask]).sum())
 
-    def heard_as(self, other: Problem) -> Self:
+    def with_noise_of(self, other: Problem) -> Self:
         """This problem with the noise that another one, of the same sensors, has learnt."""
         return self._with_noise(other.state.noise) if isinstance(other, RobotProblem) else self
 

@@ -70,7 +70,7 @@ def test_the_model_as_it_is_is_judged_along_its_own_motion(
 ) -> None:
     """Along that of the answer it would look twice as bad as `compare` says."""
     search = found.search
-    own = error_ratio(problem(logs[:3]).heard_as(search.problem), {})
+    own = error_ratio(problem(logs[:3]).with_noise_of(search.problem), {})
     assert found.fitted[0] == pytest.approx(own, rel=0.2)
     assert search.points[NULL].fitted_error > 1.5 * own
 
