@@ -9,7 +9,7 @@ import pytest
 
 from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.identify.infer.null_model import Baseline
-from kemba.identify.infer.structure import settled
+from kemba.identify.infer.structure import fitted_figures
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.problem import Problem
@@ -60,7 +60,7 @@ def test_a_bounded_fit_holds_where_a_linear_step_runs_off() -> None:
     slope, usual = problem.jacobian({}, ["tau"])[:, 0], problem.residual({})
     linear = 0.1 - float(slope @ usual) / float(slope @ slope)
     assert linear < 0.0  # no time constant at all
-    found, figures = settled(problem)
+    found, figures = fitted_figures(problem)
     assert figures["tau"] == pytest.approx(TRUE["tau"], rel=0.2)  # the pull is not in it yet
     assert error_ratio(found, figures) < 0.2 * error_ratio(problem)
 
@@ -68,13 +68,13 @@ def test_a_bounded_fit_holds_where_a_linear_step_runs_off() -> None:
 def test_a_fit_stays_within_the_limits_of_a_figure() -> None:
     problem = Filling()
     problem.limits = lambda name: (0.06, 0.5)  # type: ignore[method-assign]
-    _, figures = settled(problem)
+    _, figures = fitted_figures(problem)
     assert figures["tau"] == pytest.approx(0.06, rel=1e-3)
 
 
 def test_effects_are_searched_about_the_figures_found() -> None:
     problem = Filling()
-    base = Baseline(problem, begin=settled(problem)[1])
+    base = Baseline(problem, begin=fitted_figures(problem)[1])
     table = {h: e for h, e in base.table.items() if len(h) == 1}
     assert max(table, key=table.__getitem__) == ("pull",)
     z = base.ranker(base.point.linear).score(("pull",)).z

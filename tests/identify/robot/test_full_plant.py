@@ -11,7 +11,7 @@ pytest.importorskip("numba")
 from full_plant import answered, plant_log, written
 
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.structure import settled
+from kemba.identify.infer.structure import fitted_figures
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.structure import LINE, ORIFICE
 from kemba.identify.robot.problem import robot_problem
@@ -28,7 +28,7 @@ def test_orifices_a_line_and_friction_explain_the_full_plant() -> None:
         for names in (("hop", "jump height=0.74 m"), ("jump height=0.64 m",))
     )
     usual = error_ratio(kept.rebuilt({}))
-    built, figures = settled(fitted.rebuilt({}))
+    built, figures = fitted_figures(fitted.rebuilt({}))
     judge = kept.rebuilt({}).relinearise(figures)
     alone = error_ratio(judge, figures)
     assert alone < 2.0 < 2.4 < usual

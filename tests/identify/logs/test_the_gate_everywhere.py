@@ -10,7 +10,6 @@ from typer.testing import CliRunner
 
 from kemba_cli.main import app
 
-DATA = Path(__file__).parent / "data"
 Damage = Callable[[str], str]
 MAP = """\
 kind: bench
