@@ -38,7 +38,7 @@ PLANT = "plant"  # the shipped simulated robot, with physical chambers
 AROUND = 0.01  # s before and after a reading from which a speed is told
 
 
-def with_learnt_noise(problem: Problem) -> Problem:
+def _with_learnt_noise(problem: Problem) -> Problem:
     """The problem under the noise of its own logs, learnt beside a flexible model."""
     return with_learnt_colour(problem, free_starts(problem))
 
@@ -48,10 +48,10 @@ def noise_ratio(problem: Problem, figures: Mapping[str, float] | None = None) ->
 
     `figures`: of the machine, as `Evidence.figures`; without them all are nominal.
     """
-    return error_ratio(with_learnt_noise(problem), figures_felt(problem, figures or {}))
+    return error_ratio(_with_learnt_noise(problem), _figures_felt(problem, figures or {}))
 
 
-def figures_felt(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
+def _figures_felt(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
     """Those figures of a machine that these logs can feel."""
     return {name: value for name, value in figures.items() if name in problem.nuisance}
 
@@ -62,7 +62,7 @@ def plant_of(model: str | Path, scene: Scene) -> Model:
     return build_model(load_spec(PLANT).model_copy(update={"robot": robot}), scene=scene)
 
 
-def measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
+def _measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
     """What logs span of heights, speeds, supply pressures and valve modes."""
     spec, body = load_spec(model), [log for log in logs if "body/z" in log]
     apex = [float(np.nanmax(log["body/z"])) for log in body]
@@ -197,7 +197,7 @@ def _evidence(
         "error_held_out": answer.error_after,
         "error_plant": plant,
         "figures": {name: float(f"{x:.6g}") for name, x in answer.machine.items()},
-        "measured": measured_in([*fitted, *kept], model).model_dump(exclude_none=True),
+        "measured": _measured_in([*fitted, *kept], model).model_dump(exclude_none=True),
     }
 
 
@@ -317,10 +317,10 @@ def compare_read(
     tell("finding the motion in the logs")
     problem, _ = admitted(read, built)
     tell("learning the noise of the sensors")
-    problem = with_learnt_noise(problem)
+    problem = _with_learnt_noise(problem)
     tell("comparing with the model")
     evidence = load_spec(model).evidence
-    figures = figures_felt(problem, evidence.figures) if evidence else {}
+    figures = _figures_felt(problem, evidence.figures) if evidence else {}
     return compare(problem, model, [str(log.meta["path"]) for log in read], figures), problem
 
 

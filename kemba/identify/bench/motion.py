@@ -57,7 +57,7 @@ def smooth_motion(
     """
     good = np.isfinite(x)
     noise = noise or ChannelNoise()
-    grid, values, step = even_grid(time, x)
+    grid, values, step = _even_grid(time, x)
     sigma = max(difference_sigma(x[good]), FINEST)
     position, rate, spread, half = _adaptive(values, sigma, step, noise)
     if v is not None and np.isfinite(v).sum() > MEASURED * len(v):
@@ -67,7 +67,7 @@ def smooth_motion(
     return SmoothedMotion(time, x, v, a, spread, sigma * noise.spread)
 
 
-def even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
+def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
     """Even times (m,) [s] of about the same step, x (m,) there, and the step [s]; rows without a
     value are bridged."""
     good = np.isfinite(x)
@@ -188,7 +188,7 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
 def _quiet(time: Array, x: Array) -> _Quiet | None:
     """A log without its motion; None where it is too short."""
     width = QUIET_WIDTH
-    grid, values, step = even_grid(time, x)
+    grid, values, step = _even_grid(time, x)
     if len(grid) < 2 * width + 1:
         return None
     smooth, v = (local_fit(values, width, step, 3, k) for k in (0, 1))

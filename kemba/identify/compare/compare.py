@@ -146,7 +146,7 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tu
     return rms(sums), clean and rms(sums) <= BinSettings.tolerated
 
 
-def measured_units(rows: Rows) -> dict[str, str]:
+def _measured_units(rows: Rows) -> dict[str, str]:
     """Header of every measured channel: those with a place in a log."""
     units = {"x": "m", "z": "m", "q": "rad", "pitch": "rad", "F": "N", "P": "Pa"}
     found = {}
@@ -162,7 +162,7 @@ def _channels(
 ) -> Iterable[ChannelError]:
     errors = problem.window_errors(start)
     sums = window.sums(r)
-    headers = measured_units(rows)
+    headers = _measured_units(rows)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
         if channel not in headers or not own.any():

@@ -128,7 +128,7 @@ def _plain(places: int, pulses: int) -> Iterator[Array]:
         yield np.concatenate([way, early, early, [1.0]])
 
 
-def best_point(
+def _best_point(
     worth: Callable[[Array], float],
     begin: Array,
     say: Callable[[str], None] = lambda text: None,
@@ -265,7 +265,7 @@ def design_rig_test(
 
     search = DesignSearchSettings
     say(f"designing a test of {duration:.1f} s")
-    point, tried = best_point(worth, beginnings(search.members, search.seed), say, bounded)
+    point, tried = _best_point(worth, beginnings(search.members, search.seed), say, bounded)
     rig = course(point, duration, bench.stroke)
     say("fitting the rivals to what the tests would measure")
     before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))

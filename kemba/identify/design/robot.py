@@ -174,7 +174,7 @@ class RobotDesign:
     tried: int
 
 
-def design_motion(
+def _design_motion(
     model: Model,
     rivals: Rivals,
     say: Callable[[str], None] = lambda text: None,
@@ -196,7 +196,7 @@ def design_motion(
         if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
             break
         count += 1
-        tried = try_out(model, sway, rivals)
+        tried = _try_out(model, sway, rivals)
         if tried is None:
             continue
         if tried.evidence.first == "":
@@ -210,7 +210,7 @@ def design_motion(
     return RobotDesign(standard, tuple(found), count)
 
 
-def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
+def _try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
     """A sway on the simulation; None where it is not safe."""
     settings = SwaySettings
     try:
@@ -230,7 +230,7 @@ def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
     return found if found is not None else Separation("", {})
 
 
-def expected_of_run(run: str | Path, model: Model, rivals: Rivals) -> Separation:
+def _expected_of_run(run: str | Path, model: Model, rivals: Rivals) -> Separation:
     """The same of a run folder's plan."""
     done = execute(run, model, sample=1.0 / SwaySettings.rows).trajectory
     return expected(model, done, rivals)
@@ -370,7 +370,7 @@ class MotionProposal:
 
     def nats_of(self, run: str | Path) -> float:
         """Expected evidence [nats] of the plan in a run folder."""
-        return expected_of_run(run, self.model, self.rivals).least
+        return _expected_of_run(run, self.model, self.rivals).least
 
 
 def propose_motion(
@@ -389,7 +389,7 @@ def propose_motion(
     model = load_model(base)
     if model.mechanism.rig or not model.mechanism.robot:
         raise KembaError(str(folder), f"its model {model.name} is no robot")
-    design = design_motion(model, rivals, say, bounded)
+    design = _design_motion(model, rivals, say, bounded)
     if design is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no log of the robot shows a difference between {names}")

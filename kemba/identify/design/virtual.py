@@ -35,21 +35,21 @@ class VirtualBench:
         """The problem of a rig's tests, the first few of them."""
         tests = rig.tests(np.random.default_rng(0), self.stroke)
         logs = [
-            prepare(test.name, virtual_log(test, self.rows, i), on_rows=True)
+            prepare(test.name, _virtual_log(test, self.rows, i), on_rows=True)
             for i, test in enumerate(islice(tests, ExperimentSettings.tests))
         ]
         if len(logs) > 1:
             return self._coloured(BenchProblem(logs, self.model))
         if self._first is None:
             self._first = BenchProblem(logs, self.model)
-        return self._coloured(with_logs(self._first, logs))  # compiled functions are used again
+        return self._coloured(_with_logs(self._first, logs))  # compiled functions are used again
 
     def _coloured(self, problem: BenchProblem) -> BenchProblem:
         problem.colour = {(i, 0): self.colour for i in range(len(problem.logs))}
         return problem
 
 
-def with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
+def _with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
     """The same problem on as many other logs."""
     found = copy(problem)
     found.predicted = replace(problem.predicted, logs=tuple(logs))
@@ -63,7 +63,7 @@ def as_predicted(problem: BenchProblem, theta: Theta) -> BenchProblem:
     for i, log in enumerate(problem.logs):
         readings = problem.predicted.readings(theta, i)
         logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
-    return with_logs(problem, logs)
+    return _with_logs(problem, logs)
 
 
 def log_time(rig: Rig, stroke: float) -> float:
@@ -73,7 +73,7 @@ def log_time(rig: Rig, stroke: float) -> float:
     return sum(float(test.times[-1] - test.times[0]) for test in tests)
 
 
-def virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
+def _virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
     """A test as a log with so many rows per second. Its force is the noise of the sensor alone."""
     settings, rng = ExperimentSettings, np.random.default_rng(seed)
     step = float(test.times[1] - test.times[0])
@@ -114,7 +114,7 @@ class JudgedRig:
         return self.evidence.least / self.log_s
 
 
-def menu(stroke: float) -> list[Rig]:
+def _menu(stroke: float) -> list[Rig]:
     """Standard tests of one piston of this stroke [m]."""
     modes = ("extend", "retract", "both", "none")
     slow = DynamometerRig.model_validate(
@@ -136,7 +136,7 @@ def menu(stroke: float) -> list[Rig]:
 
 def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedRig]:
     """Every standard test; none where a rig cannot show two of the rivals."""
-    for rig in menu(bench.stroke):
+    for rig in _menu(bench.stroke):
         found = separation(bench.problem(rig), rivals)
         if found is None:
             return

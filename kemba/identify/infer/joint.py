@@ -173,7 +173,7 @@ def own_figures(problem: Problem) -> tuple[str, ...]:
     return tuple(n for n in problem.nuisance if n in written)
 
 
-def single_figures(problem: Problem) -> tuple[str, ...]:
+def _single_figures(problem: Problem) -> tuple[str, ...]:
     """The other nominal figures of the machine: of effects leg by leg, and of links."""
     own, model = own_figures(problem), getattr(problem, "model", None)
     kinds = {e.kind for e in model.effects} if model is not None else set()
@@ -202,7 +202,7 @@ def _fitted(
     own = own_figures(problem)
     keys = {k for e in hypothesis for k in tuple(problem.candidates[e].keys())}
     starts = (n for n in problem.nuisance if n.startswith(START))
-    free = (*own, *single_figures(problem), *starts)
+    free = (*own, *_single_figures(problem), *starts)
     theta = {k: v for k, v in start.items() if k in keys or k in free}
     loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in RIG_FIGURES}
     candidates = problem.candidates | {
@@ -298,7 +298,7 @@ def _as_written(
             slope[i] = -1.0 / max(value[i], 1e-12) ** 2
             value[i], low[i], high[i] = 1.0 / np.maximum([value[i], high[i], low[i]], 1e-12)
         told.append(f"{effect}.{parameter}")
-    machine = {n: theta[n] for n in single_figures(problem) if n in theta}
+    machine = {n: theta[n] for n in _single_figures(problem) if n in theta}
     return JointFit(
         dict(theta), tuple(told), value, low, high, covariance * np.outer(slope, slope), figures,
         machine, (enumerated(remarks),) if remarks else (),

@@ -85,12 +85,12 @@ def linearise(
 ) -> tuple[Linear, Array, Array]:
     """The problem at theta, with J (n, k) and the residual (n,); `blocks` (n,) labels the rows."""
     names = names_of(problem, theta) if names is None else tuple(names)
-    r, jacobian = problem.residual(theta), slopes_at(problem, theta, names)
+    r, jacobian = problem.residual(theta), _slopes_at(problem, theta, names)
     at, mean, width = priors(problem, theta, names)
     return condense(names, at, mean, width, jacobian, r, blocks), jacobian, r
 
 
-def slopes_at(problem: Problem, theta: Theta, names: Iterable[str]) -> Array:
+def _slopes_at(problem: Problem, theta: Theta, names: Iterable[str]) -> Array:
     """J (n, k) at theta, along the logarithm of every shape."""
     names = tuple(names)
     jacobian = problem.jacobian(theta, names)

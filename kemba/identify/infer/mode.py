@@ -84,10 +84,10 @@ def _at(
     it may not be there: points are compared by their `cost`."""
     linear, jacobian, blocks = slopes
     about = moved(linear, priors(problem, theta, linear.names)[0], jacobian, r, blocks)
-    return Mode(dict(theta), about, r, cost_at(problem, hypothesis, theta, r, linear))
+    return Mode(dict(theta), about, r, _cost_at(problem, hypothesis, theta, r, linear))
 
 
-def cost_at(
+def _cost_at(
     problem: Problem, hypothesis: Hypothesis, theta: Theta, r: Array, linear: Linear
 ) -> float:
     """Half a sum of squares of the residual r (n,) at theta and of the hypothesis's priors."""

@@ -99,7 +99,7 @@ RIDGES = (1e-4, 1e-2, 1.0)  # penalties of the regression that are tried
 FOLDS = 5  # blocks of time that are left out in turn: five
 
 
-def structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
+def _structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     """Mean square of the residual in noise units, and the part of it that repeats itself.
 
     A regression on everything that a force could depend on is learnt on some blocks of time. What
@@ -143,10 +143,10 @@ def _folds(run: Labels) -> Labels:
 
 def unfinished(search: Search, best: Hypothesis) -> bool:
     """Whether so much structure is left that the answer cannot be complete."""
-    power, structure = structured(search, best)
+    power, structure = _structured(search, best)
     if not best or structure <= STRUCTURE:
         return structure > STRUCTURE
-    before, _ = structured(search, NULL)
+    before, _ = _structured(search, NULL)
     return structure > LEFT * max(before - power, 0.0)
 
 

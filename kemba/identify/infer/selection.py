@@ -72,7 +72,7 @@ def simplest(search: Search, selection: Selection) -> Selection:
     _thin(search, best)
     known = _known_parts(search, best)
     least = min(known, key=lambda h: window_powers(search, h).sum())
-    equal = [h for h in known if is_enough(search, h, least)]
+    equal = [h for h in known if _is_enough(search, h, least)]
     fine = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
     fine = fine or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
@@ -91,11 +91,11 @@ def _thin(search: Search, best: Hypothesis) -> None:
     due."""
     rest = least = best
     while len(rest) > 1 and not search.late:
-        smaller = parts_of(rest)
+        smaller = _parts_of(rest)
         _visit(search, smaller)
         rest = min(smaller, key=lambda h: window_powers(search, h).sum())
         least = min(least, rest, key=lambda h: window_powers(search, h).sum())
-        if not is_enough(search, rest, least):
+        if not _is_enough(search, rest, least):
             break
 
 
@@ -104,7 +104,7 @@ def _known_parts(search: Search, hypothesis: Hypothesis) -> list[Hypothesis]:
     return [h for h in search.points if h and set(h) <= set(hypothesis)]
 
 
-def parts_of(hypothesis: Hypothesis) -> list[Hypothesis]:
+def _parts_of(hypothesis: Hypothesis) -> list[Hypothesis]:
     """All hypotheses with one effect less."""
     return [tuple(e for e in hypothesis if e != member) for member in hypothesis]
 
@@ -115,7 +115,7 @@ def likeliest_part(search: Search, hypothesis: Hypothesis) -> Hypothesis:
     Where none was refitted, all are now: an answer of which one effect is not needed would else be
     compared with nothing, and taken for nothing.
     """
-    parts = parts_of(hypothesis)
+    parts = _parts_of(hypothesis)
     if not any(part in search.points for part in parts):
         _visit(search, parts)
     known = (part for part in parts if part in search.points)
@@ -147,7 +147,7 @@ def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Select
             continue
         if len(other) == len(chosen) and as_good(search, other, chosen):
             rivals.append(other)
-        elif is_enough(search, chosen, other) or (
+        elif _is_enough(search, chosen, other) or (
             set(chosen) < set(other) and dropped & set(other)
         ):
             dismissed.add(other)
@@ -169,7 +169,7 @@ def is_unsupported(search: Search, best: Hypothesis) -> bool:
     return not gain.pays or gain.nats < BootstrapSettings.least
 
 
-def nothing_selected(selection: Selection) -> Selection:
+def _nothing_selected(selection: Selection) -> Selection:
     """Nothing, where left-out data do not support the best hypothesis."""
     remark = (
         f"{' and '.join(selection.best)} would fit these readings better, but left-out data are "
@@ -186,7 +186,7 @@ def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     return not gain.pays or gain.nats < BootstrapSettings.least
 
 
-def is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
+def _is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     """Whether the larger hypothesis is not needed beside the smaller one."""
     return as_good(search, smaller, larger) or is_little(search, smaller, larger)
 
@@ -235,7 +235,7 @@ def selected(search: Search, best: Hypothesis, p_value: float) -> Selection:
         if simpler.best != best:
             selection = simpler
         else:
-            return nothing_selected(simpler) if is_unsupported(search, best) else simpler
+            return _nothing_selected(simpler) if is_unsupported(search, best) else simpler
     return selection
 
 
@@ -318,7 +318,7 @@ def quoted(
     if best == selection.best:
         return selection, whole
     return (
-        replace(selection, best=best) if best else nothing_selected(selection)
+        replace(selection, best=best) if best else _nothing_selected(selection)
     ), whole if best else ()
 
 

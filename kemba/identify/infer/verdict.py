@@ -65,13 +65,13 @@ def caveats_of(
         others = ", ".join(" + ".join(h) for h in selection.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    unsure = unasked(search, best) if ended else ()
+    unsure = _unasked(search, best) if ended else ()
     if unsure and not reasons:
         return Caveats((ENDED,), part=True, unsure=unsure)
     return Caveats(tuple(reasons), part, unsure)
 
 
-def unasked(search: Search, best: Hypothesis) -> Hypothesis:
+def _unasked(search: Search, best: Hypothesis) -> Hypothesis:
     """Effects of an ended search's answer that nothing else was asked for: smaller answers, and
     sensors that drift instead of being wrong, come last."""
     asked_smaller = len(best) == 1 or not search.late

@@ -16,7 +16,7 @@ from kemba.trajectory import TIME, Array, Trajectory
 UNMAPPED = "of a log of another program, give its source in the column map (--map)"
 
 
-def log_fault(
+def _log_fault(
     log: Trajectory,
     what: str,
     expected: str = "",
@@ -56,7 +56,7 @@ def check_logs(logs: Sequence[Trajectory]) -> list[str]:
 def _faults(log: Trajectory) -> list[KembaError]:
     """Faults of one log; a later check runs only where the earlier ones found nothing."""
     if log.meta["kind"] in OWN_RIGS:
-        return own_faults(log)
+        return _own_faults(log)
     for stage in (_columns, _time, _cells, _values):
         found = list(stage(log))
         if found:
@@ -68,13 +68,13 @@ def _columns(log: Trajectory) -> Iterator[KembaError]:
     for name in needed(log):
         if name not in log:
             hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
-            yield log_fault(log, f"needs the column '{name}', which is missing", hint=hint)
+            yield _log_fault(log, f"needs the column '{name}', which is missing", hint=hint)
     for name in log.names:
         unit = _unit_of(name)
         if unit is not None and log.unit(name) != unit:
             what = f"the column's unit is [{log.unit(name)}]"
             expected, hint = f"'{name} [{unit}]' was expected", "convert it with --map"
-            yield log_fault(log, what, expected, hint, column=name)
+            yield _log_fault(log, what, expected, hint, column=name)
 
 
 def _unit_of(name: str) -> str | None:
@@ -88,7 +88,7 @@ def _clock(log: Trajectory, fewest: int) -> Iterator[KembaError]:
     """Enough rows, and times that increase from one to the next."""
     t = log.time
     if len(t) < fewest:
-        yield log_fault(log, f"has {len(t)} rows", f"at least {fewest} were expected")
+        yield _log_fault(log, f"has {len(t)} rows", f"at least {fewest} were expected")
         return
     wrong = ~np.isfinite(t)
     wrong[1:] |= ~(np.diff(t) > 0)
@@ -100,7 +100,7 @@ def _clock(log: Trajectory, fewest: int) -> Iterator[KembaError]:
             what = f"the time {same}: {t[i]:.6f} s after {t[i - 1]:.6f} s"
         count = f"{int(wrong.sum())} such rows; are rows duplicated, or clocks mixed?"
         expected = "times must increase from row to row"
-        yield log_fault(log, what, expected, count, row=i, column=TIME)
+        yield _log_fault(log, what, expected, count, row=i, column=TIME)
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
@@ -112,15 +112,15 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
     span = t[-1] - t[0]
     if span < limits.shortest:
         expected = f"at least {limits.shortest} s were expected"
-        yield log_fault(log, f"lasts {span:.3f} s", expected)
+        yield _log_fault(log, f"lasts {span:.3f} s", expected)
     step = float(np.median(np.diff(t)))
     if step > limits.slowest:
         in_ms = step > limits.milliseconds
         hint = "is the time in milliseconds?" if in_ms else "a chamber fills within 8 ms"
         expected = f"at least {1.0 / limits.slowest:.0f} rows a second"
-        yield log_fault(log, f"has a row every {step:.3g} s", expected, hint)
+        yield _log_fault(log, f"has a row every {step:.3g} s", expected, hint)
     elif span > limits.gaps * len(t):
-        yield log_fault(log, "has gaps longer than all of its rows", column=TIME)
+        yield _log_fault(log, "has gaps longer than all of its rows", column=TIME)
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
@@ -131,10 +131,10 @@ def _cells(log: Trajectory) -> Iterator[KembaError]:
         step, share = rate_missing(log.time, y)
         if share > limits.missing:
             what = f"{100 * share:.0f} % of its readings are missing"
-            yield log_fault(log, what, column=name, row=int(np.argmax(missing)))
+            yield _log_fault(log, what, column=name, row=int(np.argmax(missing)))
         elif step > limits.slowest:
             expected = f"at least {1.0 / limits.slowest:.0f} readings a second"
-            yield log_fault(log, f"has a reading every {step:.3g} s", expected, column=name)
+            yield _log_fault(log, f"has a reading every {step:.3g} s", expected, column=name)
         elif "valve/" in name:
             yield from _valve(log, name, y)
 
@@ -147,7 +147,7 @@ def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         what = f"the valve command is {y[i]:g}"
         hint = "map a voltage or per cent with a scale" if y[i] > 1 else ""
         expected = f"0 or 1 within {far:g} was expected"
-        yield log_fault(log, what, expected, hint, row=i, column=name)
+        yield _log_fault(log, what, expected, hint, row=i, column=name)
 
 
 def _values(log: Trajectory) -> Iterator[KembaError]:
@@ -178,7 +178,7 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     if outside.mean() > few:
         i = int(np.argmax(outside))
         what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
-        yield log_fault(
+        yield _log_fault(
             log,
             what,
             f"{expected.split(';')[0]} expected",
@@ -206,7 +206,7 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     at_end = value in (values.max(), values.min())
     what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
     hint = "is the sensor saturated?" if at_end else "is the sensor stuck?"
-    yield log_fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
+    yield _log_fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
 
 
 def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
@@ -221,7 +221,7 @@ def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         i = int(np.argmax(far))
         what = f"leaps by {1e3 * step[i]:.1f} mm within {1e3 * passed[i]:.1f} ms"
         hint = "are two logs joined?"
-        yield log_fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
+        yield _log_fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:
@@ -243,16 +243,16 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
     moving = [n for n in needed(log) if n.endswith("/x") or n == "body/z"]
     moved = any(_travel(log[n]) > limits.moves for n in moving)
     if not switched and not moved:
-        yield log_fault(
+        yield _log_fault(
             log, "no valve switches and nothing moves", "a log with excitation was expected"
         )
         return
     if log.meta["kind"] == "bench" and _travel(log["piston/F"]) == 0.0:
-        yield log_fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
+        yield _log_fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
     for leg in legs_of(log) if log.meta["kind"] == "robot" else ():
         for name in (f"{leg}/hip/q", f"{leg}/piston/x", "body/z"):
             if np.ptp(log[name][np.isfinite(log[name])]) == 0.0 and len(log) > limits.dead:
-                yield log_fault(log, "never changes", "is the sensor dead?", column=name, row=0)
+                yield _log_fault(log, "never changes", "is the sensor dead?", column=name, row=0)
 
 
 def _travel(y: Array) -> float:
@@ -280,7 +280,7 @@ def sentence(faults: Iterable[KembaError]) -> str:
     return "The data cannot be right: " + " | ".join(str(f) for f in faults[:3]) + more
 
 
-def own_faults(log: Trajectory) -> list[KembaError]:
+def _own_faults(log: Trajectory) -> list[KembaError]:
     """Faults of the log of a rig; a later check runs only where the earlier ones found nothing."""
     for stage in (_rig_columns, _rig_time, _rig_readings, _rig_excitation):
         found = list(stage(log))
@@ -300,11 +300,11 @@ def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
                 continue
             hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
             what = f"needs the column '{name} [{unit}]', which is missing"
-            yield log_fault(log, what, "the model's rig asks for it", hint)
+            yield _log_fault(log, what, "the model's rig asks for it", hint)
         elif log.unit(name) != unit:
             what = f"the column's unit is [{log.unit(name)}]"
             hint = "convert it with --map; is the axis of the rig linear or rotary?"
-            yield log_fault(log, what, f"'{name} [{unit}]' was expected", hint, column=name)
+            yield _log_fault(log, what, f"'{name} [{unit}]' was expected", hint, column=name)
 
 
 def _rig_time(log: Trajectory) -> Iterator[KembaError]:
@@ -321,14 +321,14 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
         good = np.isfinite(y)
         if vessel and good.sum() < FEWEST_STILL:
             what = f"has {int(good.sum())} readings"
-            yield log_fault(log, what, f"at least {FEWEST_STILL} were expected", column=name)
+            yield _log_fault(log, what, f"at least {FEWEST_STILL} were expected", column=name)
         elif not vessel and 1.0 - good.mean() > MISSING:
             what = f"{100 * (1.0 - good.mean()):.0f} % of its readings are missing"
-            yield log_fault(log, what, column=name, row=int(np.argmin(good)))
+            yield _log_fault(log, what, column=name, row=int(np.argmin(good)))
         elif name.endswith("/P") and np.median(y[good]) < VACUUM:
             what = f"reads {np.median(y[good]):.4g} Pa, less than any air pressure"
             hint = "is it in bar or kPa, or above the atmosphere? Convert it with --map"
-            yield log_fault(log, what, "pascals, absolute, were expected", hint, column=name)
+            yield _log_fault(log, what, "pascals, absolute, were expected", hint, column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
@@ -339,6 +339,6 @@ def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
         steps = np.diff(np.unique(y))
         if not len(steps):
             hint = "is the sensor dead, or the rig at rest?"
-            yield log_fault(log, "never changes", "a log of a rig that works", hint, 0, name)
+            yield _log_fault(log, "never changes", "a log of a rig that works", hint, 0, name)
         elif name.endswith(("/x", "/q")) and np.ptp(y) < UNMOVED * (steps.min()):
-            yield log_fault(log, "hardly moves", "a log with motion was expected", column=name)
+            yield _log_fault(log, "hardly moves", "a log with motion was expected", column=name)

@@ -72,7 +72,7 @@ def range_of(name: str) -> tuple[float, float, str] | None:
     return next((v for k, v in RANGES.items() if name == k or name.endswith(f"/{k}")), None)
 
 
-def check_kind(kind: Any, kinds: Collection[str], where: str) -> str:
+def _check_kind(kind: Any, kinds: Collection[str], where: str) -> str:
     """The kind of a log. Raises KembaError where it is none of `kinds`."""
     if isinstance(kind, str) and kind in kinds:
         return kind
@@ -82,7 +82,7 @@ def check_kind(kind: Any, kinds: Collection[str], where: str) -> str:
     raise KembaError(f"{where}: kind", f"'{kind}' is no kind of log", f"{named} was expected", hint)
 
 
-def check_noise(
+def _check_noise(
     noise: Any, units: Mapping[str, str], where: str
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Noise (1 sigma, in the column's SI unit) by channel without unit, and the correlation time
@@ -152,10 +152,10 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
     beside = str(sidecar(path))
-    log.meta["kind"] = check_kind(log.meta["kind"], KINDS, beside)
+    log.meta["kind"] = _check_kind(log.meta["kind"], KINDS, beside)
     if "noise" in log.meta:
         units = {name: log.unit(name) for name in log.names}
-        log.meta["noise"], log.meta["noise_time"] = check_noise(log.meta["noise"], units, beside)
+        log.meta["noise"], log.meta["noise_time"] = _check_noise(log.meta["noise"], units, beside)
     return _without_absurd(_with_torques(log))
 
 

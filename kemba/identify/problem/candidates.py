@@ -88,7 +88,7 @@ def by_default(name: str) -> Effect:
     return BY_KIND[kind].model_validate({"kind": kind, **where})
 
 
-def switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str, ...]:
+def _switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str, ...]:
     """Names of the candidates, sensors left out, that theta switches on."""
     return tuple(
         name
@@ -116,7 +116,7 @@ class CompiledModels(Generic[T]):
 
     def at(self, theta: Theta) -> T:
         """The model with the effects on its list that theta switches on."""
-        active = switched_on(self.candidates, theta)
+        active = _switched_on(self.candidates, theta)
         if active not in self._known:
             present = {e.name for e in self.model.effects}
             extra = (e for e in map(by_default, active) if e.name not in present)

@@ -84,7 +84,7 @@ class RigFit:
         dump_yaml({"name": path.stem, "base": base, "effects": effects, "notes": notes}, path)
 
 
-def fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
+def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
     without a value start at their usual size. Raises KembaError where logs cannot tell them apart.
     """
@@ -195,4 +195,4 @@ def characterise_logs(
     built = load_model(model)
     taken_on(read, built.mechanism)
     check_logs(read)
-    return fit_rig(excerpts(read)[0], built)
+    return _fit_rig(excerpts(read)[0], built)

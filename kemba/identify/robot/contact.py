@@ -98,7 +98,7 @@ def read_schedule(
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         level = ground_level(z, vz)
-        ground = np.maximum(level, wandering_level(z, level, dt))
+        ground = np.maximum(level, _wandering_level(z, level, dt))
         near = z < ground + limits.may_touch
         touches = z < level + limits.touches
         may = _dilate(near, blur)
@@ -109,7 +109,7 @@ def read_schedule(
         slips = on_ground & (np.abs(vx) > limits.sliding)
         slides = np.where(slips, np.sign(vx), 0.0)
         slow_piston = np.abs(piston_rate[:, i]) < limits.slow_piston
-        bottom, top = stop_levels(pistons[slow_piston, i], stroke)
+        bottom, top = _stop_levels(pistons[slow_piston, i], stroke)
         at_low = _closed(pistons[:, i] < bottom + near_stop[i], settle)
         at_high = _closed(pistons[:, i] > top - near_stop[i], settle)
         rests = _erode(at_low | at_high, 3 * blur) & slow_piston
@@ -190,7 +190,7 @@ def ground_level(z: Array, rate: Array) -> float:
     return float(np.median(resting[resting < low + limits.stands]))
 
 
-def wandering_level(z: Array, level: float, dt: float) -> Array:
+def _wandering_level(z: Array, level: float, dt: float) -> Array:
     """Height (n,) [m] of the lowest readings around each row, where that may still be the ground.
 
     Sensors that drift lift a standing foot by a centimetre, and more than that from its usual
@@ -203,7 +203,7 @@ def wandering_level(z: Array, level: float, dt: float) -> Array:
     return np.where(np.abs(low - level) < limits.level_search, low, level)
 
 
-def stop_levels(x: Array, stroke: float) -> tuple[float, float]:
+def _stop_levels(x: Array, stroke: float) -> tuple[float, float]:
     """Readings [m] at the two stops: the extreme ones of x (n,) [m] of a slow piston, if they are
     near the ends of the stroke. What is read of a fast one may lie behind its stop: smoothed, or
     late and shifted, it overshoots."""

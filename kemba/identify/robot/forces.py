@@ -43,7 +43,7 @@ def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
             "position [m]": np.where(where, y[..., [k]], np.nan),
         }
         found.append(
-            ForceChannel(name, "N", USUAL_FORCE_BODY, quantities, force_columns(state, [k]))
+            ForceChannel(name, "N", USUAL_FORCE_BODY, quantities, _force_columns(state, [k]))
         )
     return found
 
@@ -62,7 +62,7 @@ def _rods(state: LinearisedState) -> ForceChannel:
         "N",
         ROD,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        force_columns(state, range(3 + legs, 3 + 2 * legs)),
+        _force_columns(state, range(3 + legs, 3 + 2 * legs)),
         {side: _after(state, f"valve/{side}") for side in SIDES},
     )
 
@@ -79,7 +79,7 @@ def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
         "N.m",
         HIP,
         {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        force_columns(state, legs),
+        _force_columns(state, legs),
         {"hip/tau": _after(state, "hip/tau")},
     )
 
@@ -95,7 +95,7 @@ def _after(state: LinearisedState, command: str) -> Array:
     return batch.pad(runs, 0.0).reshape(*batch.valid.shape, -1, len(lags()) - 1)
 
 
-def force_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[Array], Array]:
+def _force_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[Array], Array]:
     """Function from forces (n, L, ports, b) on these channels to columns (rows, b) of residual."""
     motion = state.motion
 
@@ -119,20 +119,20 @@ def formula_columns(state: LinearisedState) -> dict[str, Array]:
     legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
     hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
     groups = (
-        (range(3 + legs, 3 + 2 * legs), "rods", rod_terms(y[..., rods], rate[..., rods], stroke)),
-        (range(3, 3 + legs), "hips", hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
-        ([1], "body z", body_terms("z", y[..., [1]], rate[..., [1]])),
-        ([0], "body x", drag_terms("x", rate[..., [0]])),
+        (range(3 + legs, 3 + 2 * legs), "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
+        (range(3, 3 + legs), "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
+        ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
+        ([0], "body x", _drag_terms("x", rate[..., [0]])),
     )
     found: dict[str, Array] = {}
     for channels, name, terms in groups:
         listed = list(terms)
-        columns = force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
+        columns = _force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
         found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
     return found
 
 
-def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
+def _rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
     """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
     sign = np.tanh(v / V_COULOMB)
     yield from end_terms(x, stroke)
@@ -149,7 +149,7 @@ def rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
         yield f"dahl(x, {travel:g})", turned.reshape(x.shape)
 
 
-def hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
+def _hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
     """(formula, torque at the hip (n, L, legs)) of angle, rate and the torque commanded."""
     sign = np.tanh(w / SPEED)
     for n in RIPPLES:
@@ -160,14 +160,14 @@ def hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
     yield "max(w, 0)", np.maximum(w, 0.0)
 
 
-def body_terms(name: str, at: Array, v: Array) -> Iterator[tuple[str, Array]]:
+def _body_terms(name: str, at: Array, v: Array) -> Iterator[tuple[str, Array]]:
     """(formula, force on the body (n, L, 1)) along one axis."""
-    yield from drag_terms(name, v)
+    yield from _drag_terms(name, v)
     for height in ROPES:
         yield f"max({name} - {height:g}, 0)", np.maximum(at - height, 0.0)
 
 
-def drag_terms(name: str, v: Array) -> Iterator[tuple[str, Array]]:
+def _drag_terms(name: str, v: Array) -> Iterator[tuple[str, Array]]:
     """(formula, force on the body (n, L, 1)) of its velocity alone."""
     yield f"v{name}*abs(v{name})", v * np.abs(v)
     yield f"v{name}**3", v**3
@@ -204,7 +204,7 @@ def robot_missing(
     y, g = state.measurement(theta), state.acceleration(theta)
     valid, k = state.batch.valid, len(names)
     for _ in range(settings.rounds if strength is None else 1):
-        system = with_forces(state, quiet, sigma)
+        system = _with_forces(state, quiet, sigma)
         x, variance = smooth_with_band(system, gains(system), y, g)
         power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
         ratio = np.sqrt(power) / sigma
@@ -225,7 +225,7 @@ def _kind(channel: str) -> str:
     return {"body/pitch": "pitch", "hip": "hip", "piston": "piston"}.get(last, "body")
 
 
-def with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
+def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
     """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
 
     `density` (n, L, c): of the other unknown forces.

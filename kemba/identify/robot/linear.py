@@ -112,7 +112,7 @@ def linearise_along(
     grip = physics.mechanism.scene.ground.friction(feet[..., 0::2], physics.grip)
     Jf_force[..., 1::2, :] -= (grip * slip)[..., None] * Jf[..., 0::2, :]
     channels = np.concatenate([Jy, Jf_force], axis=2).swapaxes(-1, -2)
-    rigid, acts = rigid_forces(channels, density, force, k, legs)
+    rigid, acts = _rigid_forces(channels, density, force, k, legs)
     dt = float(np.median(batch.h[batch.valid]))
     normal = steady(rigid[..., legs + 1 :: 2], dt)
     acting = channels[..., k - legs :]
@@ -135,7 +135,7 @@ def linearise_along(
         states,
         coloured(system, noise, batch.sigma, batch.h),
         system,
-        np.where(run_ends(batch)[..., None, None], 0.0, inverse),
+        np.where(_run_ends(batch)[..., None, None], 0.0, inverse),
         contact,
         normal,
         y,
@@ -191,12 +191,12 @@ def _filter_system(
     prior = [still.position] * k + [still.velocity] * k
     prior += [still.unknown, still.ground_level] * legs + [still.unknown] * legs
     P0 = np.diag(prior) ** 2
-    ends = run_ends(batch)
+    ends = _run_ends(batch)
     W[ends], F[ends] = 0.0, np.eye(2 * k + places)
     return System(F, G, W, H, R, np.broadcast_to(P0, (len(batch.resampled), *P0.shape)))
 
 
-def run_ends(batch: Batch) -> Flags:
+def _run_ends(batch: Batch) -> Flags:
     """Steps (n, L) that do not lead to another node of their run."""
     ends = ~batch.valid
     ends[:-1] |= ~batch.valid[1:]
@@ -212,7 +212,7 @@ def scatter(pushed: Array, density: Array, h: Array) -> Array:
     return np.asarray((pushed * (density / h[..., None])[..., None, :]) @ pushed.swapaxes(-1, -2))
 
 
-def rigid_forces(
+def _rigid_forces(
     channels: Array, density: Array, force: Array, k: int, legs: int
 ) -> tuple[Array, Flags]:
     """Forces (n, L, 3 legs) [N] of the stops and then of the feet, and where these act.

@@ -18,7 +18,7 @@ from kemba.mechanism import Cylinder
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
 
 
-def row_channels(physics: Physics) -> tuple[str, ...]:
+def _row_channels(physics: Physics) -> tuple[str, ...]:
     """The measured channels, then the places of feet and stops that stand still."""
     feet = (f"{leg}/foot/{axis}" for leg in physics.legs for axis in "xz")
     return (*physics.channels, *feet, *(f"{leg}/stop" for leg in physics.legs))
@@ -27,7 +27,7 @@ def row_channels(physics: Physics) -> tuple[str, ...]:
 def describe(state: LinearisedState) -> Rows:
     """Rows of the logs that are data, run by run, channel by channel."""
     physics, batch, inputs = state.physics, state.batch, state.motion.states[1]
-    channels = row_channels(physics)
+    channels = _row_channels(physics)
     m = len(channels)
     found: dict[str, list[Texts]] = {}
     for i, log in enumerate(batch.resampled):
@@ -64,7 +64,7 @@ def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Tex
     return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=1)
 
 
-def air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
+def _air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
     """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
     push = []
     areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
@@ -84,7 +84,7 @@ def robot_operating_point(state: LinearisedState) -> OperatingPoint:
     pistons = slice(motion.y.shape[-1] - len(legs), None)
     place = (motion.y[..., pistons], motion.rate[..., pistons], air_forces(state))
     per_leg = np.moveaxis(np.stack(place, axis=-1), 2, 0)  # (legs, n, L, 3)
-    owners = [channel.split("/")[0] for channel in row_channels(state.physics)]
+    owners = [channel.split("/")[0] for channel in _row_channels(state.physics)]
     own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
     x, v, force = state.pick(np.stack(own, axis=2)).T
     return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
@@ -95,7 +95,7 @@ def air_forces(state: LinearisedState) -> Array:
     names = [q.name for q in state.physics.model.states.values()]
     states = dict(zip(names, np.moveaxis(state.motion.states[0], -1, 0), strict=True))
     cylinder, legs = state.physics.mechanism.need_cylinder(), state.physics.legs
-    return np.stack([air_force(states, cylinder, f"{leg}/") for leg in legs], axis=-1)
+    return np.stack([_air_force(states, cylinder, f"{leg}/") for leg in legs], axis=-1)
 
 
 def changes(log: ResampledLog, legs: Sequence[str]) -> Changes:

@@ -70,7 +70,7 @@ class LinearisedState:
     @cached_property
     def _at_base(self) -> Array:
         """Free parameters (k,) where the model was linearised."""
-        return values_at(self.physics, self.base)[0]
+        return _values_at(self.physics, self.base)[0]
 
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
@@ -86,7 +86,7 @@ class LinearisedState:
     def seen(self, theta: Theta) -> tuple[Array, Array]:
         """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
         of a robot with the lengths at theta."""
-        p, _ = values_at(self.physics, theta)
+        p, _ = _values_at(self.physics, theta)
         at = self._at_base
         own = self.physics.lengths
         if np.array_equal(p[own], at[own]):
@@ -97,7 +97,7 @@ class LinearisedState:
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
-        force = self.forces.at(*values_at(self.physics, theta))
+        force = self.forces.at(*_values_at(self.physics, theta))
         for name, (column, nominal) in self.linear.items():
             if theta.get(name, nominal) != nominal:
                 force += (theta[name] - nominal) * column
@@ -105,7 +105,7 @@ class LinearisedState:
 
     def slopes(self, theta: Theta, names: Sequence[str]) -> Iterator[Array]:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
-        slopes = self.forces.slopes(*values_at(self.physics, theta)) if names else np.empty(0)
+        slopes = self.forces.slopes(*_values_at(self.physics, theta)) if names else np.empty(0)
         place = {n: i for i, n in enumerate(self.physics.names)}
         for part in at_once(len(names)):
             forces = (
@@ -174,7 +174,7 @@ def linearise_at(
     `unknown`: density of the forces that no model explains; `noise` of the sensors; `first`: the
     motion smoothed without the model's forces, where it is known.
     """
-    p = values_at(physics, base)[0]
+    p = _values_at(physics, base)[0]
     dt = float(np.median(batch.h[batch.valid]))
     late = np.array([sensors.lateness(base, channel) for channel in physics.channels])
     rows = whole_rows(late, dt)
@@ -216,7 +216,7 @@ def _along(
     noise: Noise,
 ) -> LinearisedState:
     """The model at `base` linearised along one reference."""
-    p, delays = values_at(physics, base)
+    p, delays = _values_at(physics, base)
     states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
     density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
@@ -229,7 +229,7 @@ def _along(
     )
 
 
-def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
+def _values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     """Free parameters (k,) in the order of `physics.names`, and delays (valves, 2) [s] to switching
     on and off, at theta."""
     names = zip(physics.names, physics.nominal, strict=True)
