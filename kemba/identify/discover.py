@@ -236,7 +236,6 @@ def _answer(
     )
     answer.remarks = list(caveats.reasons)
     if verdict == "partly":
-        left = rest_of(search, best, [e for e in named if e not in sure])
-        answer.rest, answer.next = left.where, left.next
+        answer.rest, answer.next = rest_of(search, best, [e for e in named if e not in sure])
     answer.sentence = phrase(answer)
     return answer

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -46,7 +45,7 @@ class RigModel:
     def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
         self.model, self.names = model, (*free, *scaled)
         node = model.build(free, scaled)
-        self._state_names = [q.name for q in model.states.values()]
+        self.state_names = tuple(q.name for q in model.states.values())
         rate = rate_of(node)
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
@@ -89,7 +88,7 @@ class RigModel:
         n, moved = len(seen), Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
         x, (v0, a) = moved.value, moved.rates
         fixed = np.repeat(p[:, None], n, axis=1)
-        states = dict(zip(self._state_names, s, strict=True))
+        states = dict(zip(self.state_names, s, strict=True))
         out = self._mapped("output", n)(s, x, v0, a, blurred, fixed)
         force = V_MIDDLE * out[0]
         for place, weight in V_NODES:
@@ -102,7 +101,7 @@ class RigModel:
     ) -> Array:
         middle = 0.5 * (times[:-1] + times[1:])
         s0 = self._rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
-        s0 += np.array([start.get(name, 0.0) for name in self._state_names])
+        s0 += np.array([start.get(name, 0.0) for name in self.state_names])
         n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
         inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
@@ -119,10 +118,6 @@ class RigModel:
             one = self._functions[kind]
             self._maps[kind, n] = _Call(one.mapaccum(n) if kind == "step" else one.map(n))
         return self._maps[kind, n]
-
-    @cached_property
-    def state_names(self) -> tuple[str, ...]:
-        return tuple(self._state_names)
 
 
 class _Call:

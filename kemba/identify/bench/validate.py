@@ -9,7 +9,6 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
-from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.problem.types import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
@@ -39,7 +38,8 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
         "valve/extend and valve/retract are inverted (1 is on)",
         replace(run, commands=(_inverted(extend), _inverted(retract))),
     )
-    flipped = _flipped(run.motion, stroke)
+    motion = run.motion
+    flipped = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
     yield "piston/x counts from the extended end (0 is retracted)", replace(run, motion=flipped)
     for factor, unit in ((1e3, "kN"), (1e-3, "mN"), (4.4482, "lbf"), (9.81, "kgf")):
         yield (
@@ -137,7 +137,3 @@ def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]
     edges = [-np.inf, *(e for pair in intervals for e in pair), np.inf]
     pairs = zip(edges[::2], edges[1::2], strict=True)
     return [(a, b) for a, b in pairs if b > a]
-
-
-def _flipped(motion: SmoothedMotion, stroke: float) -> SmoothedMotion:
-    return replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)

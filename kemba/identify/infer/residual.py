@@ -165,14 +165,6 @@ ON_RIGS = {  # by the kind of rig of the model; a piston of the robot on its ben
 STROKES = "move the rod slowly and fast over its whole stroke, hold it between, at other pressures"
 
 
-@dataclass(frozen=True)
-class Remainder:
-    """Where the rest of the error sits, and which measurement would tell more of it."""
-
-    where: str
-    next: str
-
-
 def pattern_left(search: Search, best: Hypothesis) -> str:
     """A force that the best hypothesis leaves and that goes with speed, place, load or a command,
     in words; empty where none explains a fair share of what the hypothesis itself explains.
@@ -195,8 +187,9 @@ def pattern_left(search: Search, best: Hypothesis) -> str:
     return str(first)
 
 
-def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remainder:
-    """What the best hypothesis leaves. `unsure`: effects in it that have rivals."""
+def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> tuple[str, str]:
+    """Where the error sits that the best hypothesis leaves, and which measurement would tell more
+    of it. `unsure`: effects in it that have rivals."""
     problem, theta = search.problem, search.points[best].fit.theta
     profiles = force_profiles(problem, problem.residual(theta))
     law = [hint.text for hint in lacking(profiles)]
@@ -207,7 +200,7 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> Remain
     if unsure:
         named = " and ".join(unsure)
         advice = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"
-    return Remainder("; ".join([*worst, *law]) or "no condition in particular", advice)
+    return "; ".join([*worst, *law]) or "no condition in particular", advice
 
 
 def _advice(problem: Problem, channel: str) -> str:

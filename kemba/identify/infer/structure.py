@@ -136,8 +136,7 @@ def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hy
         ladder=list(zip(steps, [before, *rungs], strict=True)),
     )
     if verdict == "partly" and not answer.rest:
-        left = rest_of(second, best, [])
-        found.rest, found.next = left.where, left.next
+        found.rest, found.next = rest_of(second, best, [])
     found.sentence = phrase(found)
     found.remarks = [*answer.remarks, f"built anew with {row.effect}; its figures were left free"]
     return found

@@ -215,8 +215,8 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     """
     if not paths:
         raise KembaError("", "no log given", "one or more CSV files were expected")
-    unique = sorted({Path(p).resolve(): Path(p) for p in paths}.values(), key=_order)
-    logs = [read_log(p, columns) for p in unique]
+    unique = {Path(p).resolve(): Path(p) for p in paths}.values()
+    logs = [read_log(p, columns) for p in sorted(unique, key=lambda p: (p.name, str(p)))]
     kinds = {log.meta["kind"] for log in logs}
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
@@ -306,7 +306,3 @@ def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
         f"at least {', '.join(BENCH)} of a rig, or body/z and so on of a robot, were expected",
         map_hint(where),
     )
-
-
-def _order(path: Path) -> tuple[str, str]:
-    return path.name, str(path)
