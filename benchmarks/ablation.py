@@ -37,12 +37,12 @@ from ablation_page import table, write
 from blind import bench, report, robot, second
 from blind.kinds import Record, hidden, kind, named
 
-from kemba.identify.bench.predicted import PredictedLogs
+from kemba.identify.bench.prediction import PredictedLogs
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.discover import discover
-from kemba.identify.doubt.cross_validation import Gain
+from kemba.identify.infer.cross_validation import Gain
+from kemba.identify.infer.joint import JointFit
 from kemba.identify.robot.problem import RobotProblem
-from kemba.identify.written.joint import JointFit
 
 STUDIES = {"bench": bench, "robot": robot, "second": second}
 RECORDS = ROOT / "benchmarks" / "ablation.jsonl"
@@ -94,53 +94,51 @@ def _differs(result: Any, search: Any, best: Any, *_: Any) -> bool:
     return bool(result != best)
 
 
-SEARCH, PARSIMONY, FORMULA = "evidence.search:Search.", "doubt.parsimony:", "doubt.formula"
+SEARCH, PARSIMONY, FORMULA = "infer.search:Search.", "infer.selection:", "infer.formula"
 RULES = [
     Rule("begun again", SEARCH + "_regrow", lambda s, best: best,
          lambda result, s, best: len(best) > 1),
     Rule("late sensors stay", SEARCH + "_settle", once,
          lambda result, s, h: bool(s.problem.held_back(result))),
     Rule("swaps", SEARCH + "_swap", lambda s, best: best, _differs),
-    Rule("followed twice", "evidence.search:SearchSettings", values={"followed": 1}),
-    Rule("colour anew", "evidence.null_model:Baseline.seen_from", lambda b, theta: None, always),
-    Rule("drifting sensors", "evidence.colour:_with_drift", lambda p, theta: p,
+    Rule("followed twice", "infer.search:SearchSettings", values={"followed": 1}),
+    Rule("colour anew", "infer.null_model:Baseline.seen_from", lambda b, theta: None, always),
+    Rule("drifting sensors", "infer.colour:_with_drift", lambda p, theta: p,
          lambda result, p, theta: result is not p),
     Rule("spikes", "problem.noise:caution", lambda r: None,
          lambda result, r: bool(np.any(result < 1.0))),
-    Rule("three tolerances", "evidence.spike_slab:SpikeSlabSettings",
+    Rule("three tolerances", "infer.spike_slab:SpikeSlabSettings",
          values={"tolerances": (1.0,)}),
-    Rule("steps to the mode", "evidence.small_effects:SmallEffectsSettings",
+    Rule("steps to the mode", "infer.mode:SmallEffectsSettings",
          values={"rounds": 0}),
-    Rule("other shapes", "evidence.refit:RefitSettings", values={"factor": 1e9}),
-    Rule("enlarged noise", "evidence.left_out_noise:_enlarged",
+    Rule("other shapes", "infer.refit:RefitSettings", values={"factor": 1e9}),
+    Rule("enlarged noise", "infer.significance:_enlarged",
          lambda own, left, root, power: own.T @ left, always),
-    Rule("material", "doubt.belief:material", lambda s, h: h),
-    Rule("rows refute", "doubt.cross_validation:left_out", lambda *_: Gain(1.0, 0.0),
-         lambda result, s, h, *_: result.refuted or (len(h) > 1 and not result.pays),
-         only="doubt.belief"),
+    Rule("material", "infer.selection:material", lambda s, h: h),
+    Rule("rows refute", PARSIMONY + "is_refuted", lambda *_: False),
     Rule("simplest", PARSIMONY + "simplest", lambda s, belief: belief,
          lambda result, s, belief: result.best != belief.best),
     Rule("overclaimed", PARSIMONY + "overclaimed", lambda *_: False),
     Rule("little", PARSIMONY + "is_little", lambda *_: False),
-    Rule("idle", PARSIMONY + "is_idle", lambda *_: False),
-    Rule("one part shows", "doubt.cross_validation:one_part_shows", lambda *_: False),
-    Rule("figures' share of a gain", "doubt.cross_validation:figures_off", lambda *_: 0.0, always),
-    Rule("ratio error", "doubt.cross_validation:gained", plain_error, always),
-    Rule("written by folds", "doubt.predictive:predictive", lambda s, best, likeliest: best),
-    Rule("strong ones written", "doubt.predictive:STRONG", values={"STRONG": np.inf}),
+    Rule("idle", PARSIMONY + "is_unsupported", lambda *_: False),
+    Rule("one part shows", "infer.cross_validation:one_part_shows", lambda *_: False),
+    Rule("figures' share of a gain", "infer.cross_validation:figures_off", lambda *_: 0.0, always),
+    Rule("ratio error", "infer.cross_validation:gained", plain_error, always),
+    Rule("written by folds", "infer.selection:predictive", lambda s, best, likeliest: best),
+    Rule("strong ones written", "infer.selection:STRONG", values={"STRONG": np.inf}),
     Rule("formulas", FORMULA + ":look", lambda s, best: None),
-    Rule("formula: bootstrap", "evidence.bootstrap:bootstrap", lambda *_: NoThreshold(), always,
+    Rule("formula: bootstrap", "infer.significance:bootstrap", lambda *_: NoThreshold(), always,
          only=FORMULA),
-    Rule("formula: drifts", "doubt.drifts:drift_columns",
+    Rule("formula: drifts", "infer.formula:drift_columns",
          lambda p: (np.empty((len(p.rows()), 0)), np.empty(0)),
          lambda result, p: bool(result[0].size)),
-    Rule("unfinished", "doubt.unexplained:unfinished", lambda *_: False),
-    Rule("pattern left", "rest:pattern_left", lambda *_: ""),
-    Rule("mixture", "stages:is_mixture", lambda share: False),
-    Rule("nothing explains", "settings:VerdictSettings", values={"unexplained": -1.0}),
-    Rule("error left", "settings:VerdictSettings", values={"whole": np.inf}),
-    Rule("part of structure", "settings:VerdictSettings", values={"part_of_structure": 0.1}),
-    Rule("equivalents", "ranking:equivalents", lambda *_: ()),
+    Rule("unfinished", "infer.residual:unfinished", lambda *_: False),
+    Rule("pattern left", "infer.residual:pattern_left", lambda *_: ""),
+    Rule("mixture", "infer.structure:is_mixture", lambda share: False),
+    Rule("nothing explains", "answer:VerdictSettings", values={"unexplained": -1.0}),
+    Rule("error left", "answer:VerdictSettings", values={"whole": np.inf}),
+    Rule("part of structure", "answer:VerdictSettings", values={"part_of_structure": 0.1}),
+    Rule("equivalents", "infer.ranking:equivalents", lambda *_: ()),
 ]  # fmt: skip
 BY_NAME = {rule.name: rule for rule in RULES}
 
@@ -214,7 +212,15 @@ def watched(acted: set[str]) -> Iterator[None]:
         yield
 
 
-LEARNING = ("recolour", "drifting", "relinearise", "rebuilt", "heard_as", "coarser", "in_detail")
+LEARNING = (
+    "recolour",
+    "drifting",
+    "relinearise",
+    "rebuilt",
+    "with_noise_of",
+    "coarser",
+    "in_detail",
+)
 PREDICTING = ("residual", "residuals", "jacobian")
 
 

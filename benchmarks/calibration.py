@@ -43,7 +43,7 @@ from scipy.stats import kstest
 from twin.cases import bench_case, draw
 from twin.measure import Sensors
 
-from kemba.identify.settings import DiscoverSettings
+from kemba.identify.answer import DiscoverSettings
 from kemba.identify.workflow import discover_logs
 
 SEED = 70_000  # no case of it was looked at while the method was built

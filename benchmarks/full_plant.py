@@ -30,10 +30,9 @@ from blind import report
 from full_plant_page import page
 
 from kemba.identify.answer import Answer
-from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import discover
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.workflow import write_answer
+from kemba.identify.workflow import compare_logs, write_answer
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
 from kemba.plant.commands import Commands, JointControl, Profile

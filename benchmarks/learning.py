@@ -29,9 +29,9 @@ from scipy.optimize import lsq_linear
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
+from kemba.identify.adopt import item
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.written.adopt import item
 from kemba.learn.correction import Aim, correction_from, flight_of
 from kemba.learn.round import Asked, learn
 from kemba.model import load_spec

@@ -19,7 +19,7 @@ from scipy.stats import kstest
 
 from kemba.config import load_yaml
 from kemba.errors import enumerated
-from kemba.identify.settings import DiscoverSettings
+from kemba.identify.answer import DiscoverSettings
 from kemba.scenarios.share import wilson
 
 ROOT = Path(__file__).parents[1]

@@ -28,13 +28,13 @@ from twin.cases import bench_case
 from twin.figures import Robot
 from twin.measure import Sensors
 
-from kemba.identify.evidence.colour import best_fit
-from kemba.identify.evidence.left_out_noise import left_out_noise
-from kemba.identify.evidence.linear import time_blocks
-from kemba.identify.evidence.search import Search
+from kemba.identify.answer import DiscoverSettings
+from kemba.identify.infer.colour import best_fit
+from kemba.identify.infer.linear import time_blocks
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.significance import left_out_noise
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.problem.problem import Array
-from kemba.identify.settings import DiscoverSettings
+from kemba.identify.problem.types import Array
 from kemba.identify.workflow import admitted, model_of
 
 SEED = 9_000

@@ -24,7 +24,7 @@ from kemba.report.solving import solve_into
 from kemba.runs import RunFolder
 from kemba.solve import Approach, Listener, best_plan
 from kemba.solve.earlier import origin_of
-from kemba.solve.trial import Executed
+from kemba.solve.trial import Trial
 from kemba.sweep import machine
 
 CHANGES = {
@@ -50,7 +50,7 @@ HEAD = (
 class Taken:
     """A plan made anew, and what it took in all [CPU s]."""
 
-    made: Executed
+    made: Trial
     seconds: float
 
     @property

@@ -16,9 +16,8 @@ from twin.measure import Sensors
 from twin.rigs import Rig as TwinRig
 
 from kemba.identify.bench.problem import BenchProblem, bench_problem
-from kemba.identify.design.confirm import best_fit, misfit
-from kemba.identify.design.rivals import Rivals
-from kemba.identify.evidence.refit import Frozen, refit
+from kemba.identify.design.separation import Rivals, best_fit, misfit
+from kemba.identify.infer.refit import Frozen, refit
 from kemba.identify.logs.reading import read_logs
 from kemba.model.model import Model
 from kemba.plant.rigs import CourseRig, Rig, Test

@@ -6,7 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from kemba.identify.robot.dynamics.samples import SampleMap
+from kemba.identify.robot.physics import SampleMap
 from kemba.machine_code import Native
 
 

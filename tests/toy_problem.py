@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
 
 EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 
@@ -43,13 +44,13 @@ class Toy(Problem):
         self.measured = np.zeros(len(v))
         self.measured = self.residual({"gain": 1.01, **truth}) + rng.standard_normal(len(v))
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         y = theta.get("gain", 1.0) * self._u + theta.get("slope", 0.0) * self._time
         for name, shape in self._shapes.items():
             y = y + theta.get(f"{name}.a", 0.0) * shape
         return np.asarray(y - self.measured)
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         n = len(self._time)
         run = np.repeat(np.arange(len(self.runs)), n // len(self.runs))
         label = np.full(n, "moving")

@@ -28,7 +28,7 @@ import numpy as np
 from blind import bench, report, study
 from blind.kinds import hidden, kind
 from blind.other_methods import figures_of
-from kemba.identify.bench.missing import FORCE
+from kemba.identify.bench.forces import FORCE
 from kemba.identify.bench.problem import BenchProblem
 
 ROWS = 400  # of all runs but the last, evenly taken

@@ -35,10 +35,10 @@ from blind import report, study
 from blind.kinds import Record, hidden, kind, named
 from blind.thorough import ThoroughFit, promised, with_own
 from kemba.identify.discover import discover
-from kemba.identify.evidence.refit import Fit
-from kemba.identify.evidence.search import Search
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.problem.problem import Theta
+from kemba.identify.infer.refit import Fit
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.problem.types import Theta
 
 STUDIES = (
     *("bench", "robot", "second"),

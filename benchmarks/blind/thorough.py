@@ -13,15 +13,13 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
-from kemba.identify.evidence.bounded import effect_bounds
-from kemba.identify.evidence.linear import Linear, estimate, priors, usual_shapes
-from kemba.identify.evidence.null_model import Baseline
-from kemba.identify.evidence.point import LinearisationPoint
-from kemba.identify.evidence.refit import Fit
-from kemba.identify.evidence.spike_slab import Hypothesis, Ranker
-from kemba.identify.evidence.windows import START
-from kemba.identify.problem.problem import Array, Problem, Theta
-from kemba.identify.problem.slopes import bounded
+from kemba.identify.infer.linear import Linear, estimate, priors, usual_shapes
+from kemba.identify.infer.null_model import Baseline, LinearisationPoint, effect_bounds
+from kemba.identify.infer.refit import Fit
+from kemba.identify.infer.spike_slab import Hypothesis, Ranker
+from kemba.identify.infer.windows import START
+from kemba.identify.problem.problem import Problem, bounded
+from kemba.identify.problem.types import Array, Theta
 
 
 class ThoroughSettings:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from kemba.config import dump_yaml
-from kemba.identify.rigs.files import characterise_logs
+from kemba.identify.rigs.characterise import characterise_logs
 from kemba.identify.workflow import discover_logs
 
 Logs = Sequence[Path]

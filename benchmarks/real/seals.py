@@ -25,7 +25,7 @@ import numpy as np
 from benchmarks.real.data import ATMOSPHERE, find
 from kemba.config import dump_yaml
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.rigs.files import characterise_logs
+from kemba.identify.rigs.characterise import characterise_logs
 from kemba.identify.rigs.problem import RigProblem, rig_problem
 from kemba.identify.workflow import discover_logs
 from kemba.model import load_model, load_spec

@@ -36,7 +36,7 @@ def adopt(
     Example: kemba-opt adopt answer --out model.yaml
     """
     from kemba.folders import fresh
-    from kemba.identify.written.adopt import adopt_answer, adopt_effect, adopted
+    from kemba.identify.adopt import adopt_answer, adopt_effect, adopted
     from kemba.model import load_model
     from kemba_cli.next_steps import after_model, say_next
 

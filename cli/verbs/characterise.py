@@ -113,8 +113,8 @@ def _own_rig(
     from rich.table import Table
 
     from kemba.folders import fresh
-    from kemba.identify.rigs.files import characterise_logs
-    from kemba.identify.written.adopt import reference
+    from kemba.identify.adopt import reference
+    from kemba.identify.rigs.characterise import characterise_logs
     from kemba_cli.next_steps import after_model, say_next
 
     if out:

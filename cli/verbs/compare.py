@@ -42,7 +42,7 @@ def compare(
     Example: kemba-opt compare jump_1.csv jump_2.csv --out heat_map.png
     """
     from kemba.folders import place_for
-    from kemba.identify.compare_logs import compare_logs
+    from kemba.identify.workflow import compare_logs
     from kemba.logs import log_files
     from kemba.model.spec import evidence_faults
     from kemba_cli.next_steps import after_compare, say_next

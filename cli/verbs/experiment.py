@@ -12,8 +12,7 @@ from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
-    from kemba.identify.design.motion_proposal import MotionProposal
-    from kemba.identify.design.robot import Tried
+    from kemba.identify.design.robot import MotionProposal, Tried
     from kemba_cli.progress import Progress
 
 
@@ -72,7 +71,7 @@ def experiment(
 
 
 def _on_rig(answer: Path, path: Path, progress: Progress) -> dict[str, Any]:
-    from kemba.identify.experiment import propose
+    from kemba.identify.design.rig import propose
     from kemba_cli.next_steps import after_experiment
 
     found = propose(answer, path, progress.tell)
@@ -81,7 +80,7 @@ def _on_rig(answer: Path, path: Path, progress: Progress) -> dict[str, Any]:
 
 def _on_robot(answer: Path, path: Path, certify: bool, progress: Progress) -> dict[str, Any]:
     """The motion as a task; with `certify` also a plan of it that is good, and what that gives."""
-    from kemba.identify.design.motion_proposal import propose_motion
+    from kemba.identify.design.robot import propose_motion
     from kemba_cli.next_steps import after_experiment, after_plan
 
     found = propose_motion(answer, path, progress.tell)

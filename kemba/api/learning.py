@@ -97,7 +97,7 @@ def compare(
     `columns`: the file of a column map; `run`: the run that was executed. `progress` gets the
     name of every stage. Raises KembaError.
     """
-    from kemba.identify.compare_logs import compare_logs
+    from kemba.identify.workflow import compare_logs
 
     return Compared(compare_logs(_listed(logs), str(model), columns, run, progress)[0])
 

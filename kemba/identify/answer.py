@@ -11,11 +11,9 @@ import numpy as np
 
 from kemba.errors import KembaError, enumerated
 from kemba.files import read_json
-from kemba.identify.evidence.point import excess
-from kemba.identify.settings import DiscoverSettings
+from kemba.identify.infer.windows import excess
 
 Verdict = Literal["missing", "partly", "nothing", "unknown", "bad-data"]
-
 PROBABILITY = (
     "The probability of an effect is that of its being among the missing ones. Several effects can "
     "be missing at once, so that the probabilities need not add up to 100 %."
@@ -122,7 +120,7 @@ class Answer:
         self.figures, self.machine = {}, {}
         self.error_after = self.error_before
 
-    def told_in(self, before: tuple[float, float]) -> None:
+    def rescaled_from(self, before: tuple[float, float]) -> None:
         """Tell the errors of steps and ranking by the scale of `error_before` and `error_after`,
         which were `before` so far, and the sentence anew."""
         old, new = before, (self.error_before, self.error_after)
@@ -231,3 +229,32 @@ def read_answer(folder: str | Path) -> dict[str, Any]:
     if not (isinstance(known.get("verdict"), str) or isinstance(known.get("ranking"), list)):
         raise KembaError(str(file), "is no answer", "the answer.json of discover was expected")
     return known
+
+
+class DiscoverSettings:
+    """When an effect is called missing, and when its answer is doubted."""
+
+    # p-value of nothing up to which something is missing: three false alarms in a hundred clean
+    # data sets (counted by benchmarks/calibration.py)
+    significant = 0.03
+    matters = 0.2  # an effect below this share of its size is not reported
+    apart = 1.96  # sigmas by which an effect differs from none: its 95 % interval
+    # length of the blocks whose signs are redrawn by the bootstrap [s]: three times the memory of
+    # its coloured forces
+    fine = 0.1
+    searching = 0.8  # share of the time limit after which the search ends
+
+
+class VerdictSettings:
+    """When an answer is complete (`missing`), and when it is a part of one (`partly`)."""
+
+    whole = 1.5  # error, in noise units, that a whole answer may leave
+    whole_share = 0.2  # or share of the error beyond the noise
+    # p-value of nothing from which an error that no effect explains is no chance: two of 200 clean
+    # machines of benchmarks/calibration.py have p-values of 0.017 and 0.02 with errors of 1.7 and
+    # 2.1 times the noise
+    unexplained = 0.01
+    part = 0.1  # smallest share of the error beyond the noise that a part of an answer explains
+    # the same where more than `whole` is left and repeats itself, or a figure drifts
+    part_of_structure = 0.5
+    sure = 0.95  # probability from which an effect is sure: 95 %

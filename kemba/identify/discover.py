@@ -8,27 +8,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.answer import ENDED, Answer, Ranked, phrase
-from kemba.identify.doubt.belief import believed, material
-from kemba.identify.doubt.cross_validation import one_part_shows
-from kemba.identify.doubt.formula import Formula, look
-from kemba.identify.doubt.held_out import HeldOut, error
-from kemba.identify.doubt.parsimony import Belief
-from kemba.identify.doubt.predictive import predictive, quoted
-from kemba.identify.doubt.run_consistency import drifting
-from kemba.identify.doubt.significance import best_gain, null_test
-from kemba.identify.evidence.bootstrap import NullTest, smallest_detectable
-from kemba.identify.evidence.figures import Rebuilt, ahead, settled
-from kemba.identify.evidence.search import Search, SearchSettings
-from kemba.identify.evidence.spike_slab import NULL, Hypothesis
-from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.answer import ENDED, Answer, DiscoverSettings, Ranked, VerdictSettings, phrase
+from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
+from kemba.identify.infer.formula import Formula, look
+from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_aliases
+from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
+from kemba.identify.infer.residual import drifting, rest_of
+from kemba.identify.infer.search import Search, SearchSettings
+from kemba.identify.infer.selection import Selection, material, predictive, quoted, selected
+from kemba.identify.infer.significance import NullTest, best_gain, null_test, smallest_detectable
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.structure import (
+    Rebuilt,
+    ahead,
+    fitted_figures,
+    is_mixture,
+    joined,
+    structure_row,
+)
+from kemba.identify.infer.verdict import Caveats, caveats_of, is_sure, verdict_on
+from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
-from kemba.identify.ranking import fitted_errors, ladder, ranked, values
-from kemba.identify.rest import rest_of
-from kemba.identify.settings import DiscoverSettings, VerdictSettings
-from kemba.identify.stages import is_mixture, joined, structure_row
-from kemba.identify.verdict import Doubts, doubts_about, is_sure, verdict_on
-from kemba.identify.written.joint import JointFit, joint_fit, told_by_figures
 
 WRITTEN = ("missing", "partly")  # verdicts that give a model
 
@@ -81,27 +81,29 @@ def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> D
     least = 0.0 if guessed else SearchSettings.structural
     theta = search.points[guess].fit.theta
     other = None if search.ended else ahead(search.problem, theta, least)
-    anew = _built_anew(search, other, holdout) if other else None
-    if anew and (anew.answer.verdict == "missing" or search.ended):
-        return anew
+    rebuilt = _with_structure(search, other, holdout) if other else None
+    if rebuilt and (rebuilt.answer.verdict == "missing" or search.ended):
+        return rebuilt
     first = judged(search, search.further(guess), holdout)
     named = search.problem.structures & set(first.best)
     mixed = any(is_mixture(values(search, first.best, s)["a"]) for s in named)
-    if anew is None:
+    if rebuilt is None:
         whole = first.answer.verdict == "missing" and not mixed
         if whole or not named or search.ended:
             return first
-        built = settled(search.problem.recolour(None).rebuilt({}))
-        anew = _built_anew(search, Rebuilt(*built), holdout)
-    if mixed and anew.answer.verdict == "missing":
-        return anew
+        built = fitted_figures(search.problem.recolour(None).rebuilt({}))
+        rebuilt = _with_structure(search, Rebuilt(*built), holdout)
+    if mixed and rebuilt.answer.verdict == "missing":
+        return rebuilt
     # one noise for both, or the model that takes more of its error for noise would look better
-    judge = (first.kept.found if first.kept else search.problem).heard_as(anew.search.problem)
+    judge = (first.kept.found if first.kept else search.problem).with_noise_of(
+        rebuilt.search.problem
+    )
     left = error_ratio(judge, search.points[first.best].fit.theta)
-    return anew if anew.answer.error_after < left else first
+    return rebuilt if rebuilt.answer.error_after < left else first
 
 
-def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Discovery:
+def _with_structure(search: Search, other: Rebuilt, holdout: Problem | None) -> Discovery:
     """What a model with the other structure lacks."""
     (structure,) = search.problem.structures
     search.say(f"building the model anew with {structure}")
@@ -110,7 +112,7 @@ def _built_anew(search: Search, other: Rebuilt, holdout: Problem | None) -> Disc
     built = holdout.rebuilt({}).relinearise(other.figures) if holdout else None
     found = judged(second, second.run(), built)
     # one noise for all rungs: that of the model that explains more of the data
-    judge = (holdout or search.problem).heard_as(second.problem)
+    judge = (holdout or search.problem).with_noise_of(second.problem)
     before = error_ratio(judge, search.points[NULL].fit.theta)
     alone = error(second, NULL, found.kept)
     fit = second.points[found.best].fit.theta
@@ -130,13 +132,13 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     ended, search.in_pieces = search.ended, one_part_shows(search, best)
     search.say("simulating logs in which nothing is missing")
     test, likeliest = null_test(search), best
-    belief = believed(search, likeliest, test.p_value(best_gain(search)))
+    selection = selected(search, likeliest, test.p_value(best_gain(search)))
     search.say("testing whether more is missing")
     kept = HeldOut.beside(holdout, search.problem) if holdout else None
-    whole = predictive(search, belief.best, likeliest) if belief.best else NULL
-    whole = told_by_figures(search.problem, whole, search.points[whole].fit.theta)
-    belief, whole = quoted(search, belief, whole, kept)
-    best, p_value, ended = belief.best, belief.p_value, ended or search.late
+    whole = predictive(search, selection.best, likeliest) if selection.best else NULL
+    whole = without_figure_aliases(search.problem, whole, search.points[whole].fit.theta)
+    selection, whole = quoted(search, selection, whole, kept)
+    best, p_value, ended = selection.best, selection.p_value, ended or search.late
     for hypothesis in filter(None, (best, whole)):
         search.visit(hypothesis)
     if test.too_short:
@@ -147,24 +149,24 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     drift = drifting(search, best)
     if drift is not None and formula is not None and drift.nats > formula.gain:
         formula = None
-    doubts = Doubts((ENDED,) if ended else ())
+    caveats = Caveats((ENDED,) if ended else ())
     if formula is None:
-        doubts = doubts_about(search, belief, drift, kept, ended)
+        caveats = caveats_of(search, selection, drift, kept, ended)
     search.say("fitting all that was found together")
     joint = None
-    if whole and verdict_on(best, formula, doubts) in WRITTEN:
+    if whole and verdict_on(best, formula, caveats) in WRITTEN:
         joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
-    elif not best and formula is None and not doubts.reasons:
+    elif not best and formula is None and not caveats.reasons:
         joint = joint_fit(search.problem, NULL, search.points[NULL].fit.theta)
     whole = whole if joint else best
     search.say("ranking the effects")
-    ranking = ranked(search, belief, kept, whole, joint)
-    answer = _answer(search, best, p_value, test, ranking, formula, kept, doubts, whole)
-    answer.remarks = [*answer.remarks, *belief.remarks]
+    ranking = ranked(search, selection, kept, whole, joint)
+    answer = _answer(search, best, p_value, test, ranking, formula, kept, caveats, whole)
+    answer.remarks = [*answer.remarks, *selection.remarks]
     if joint is not None:
         _add(answer, joint)
         answer.remarks += joint.remarks
-    if belief.idle and answer.verdict == "nothing":
+    if selection.unsupported and answer.verdict == "nothing":
         answer.idle = True
         answer.sentence = phrase(answer)
     if ended and ENDED not in answer.remarks:
@@ -181,15 +183,15 @@ def _add(answer: Answer, joint: JointFit) -> None:
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:
     """What logs allow to say that are too short for anything to be significant: whether something
     differs, but not what."""
-    gain, doubts = best_gain(search), Doubts()
+    gain, caveats = best_gain(search), Caveats()
     differs = test.share(gain) <= DiscoverSettings.significant
     if differs or error(search, NULL, kept) > VerdictSettings.whole:
         piece = DiscoverSettings.fine
-        doubts = Doubts((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
+        caveats = Caveats((f"they hold {test.blocks} pieces of {piece:g} s, and chance alone needs "
                          f"{test.needed} to be ruled out",))  # fmt: skip
-    ranking = ranked(search, Belief(), kept)
-    answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, kept, doubts)
-    if doubts.reasons:
+    ranking = ranked(search, Selection(), kept)
+    answer = _answer(search, NULL, test.p_value(gain), test, ranking, None, kept, caveats)
+    if caveats.reasons:
         answer.next = f"record at least {(test.needed + 1) * DiscoverSettings.fine:.1f} s"
         answer.sentence = phrase(answer)
     return Discovery(answer, search, NULL, kept, fitted_errors(search, NULL))
@@ -203,17 +205,17 @@ def _answer(
     ranking: Sequence[Ranked],
     formula: Formula | None,
     kept: HeldOut | None,
-    doubts: Doubts,
+    caveats: Caveats,
     whole: Hypothesis = NULL,
 ) -> Answer:
     problem = search.problem
     by_run = len(problem.runs) > 3 and not search.in_pieces
     before = error(search, NULL, kept)
     after = error(search, whole, kept) if whole else before
-    verdict = verdict_on(best, formula, doubts)
+    verdict = verdict_on(best, formula, caveats)
     rows = {r.effect: r for r in ranking}
     named = tuple(effect for effect in rows if effect in best)
-    sure = tuple(r for r in named if r not in doubts.unsure and is_sure(rows[r]))
+    sure = tuple(r for r in named if r not in caveats.unsure and is_sure(rows[r]))
     added = tuple(effect for effect in rows if effect in whole) if verdict in WRITTEN else ()
     ranker = search.base.ranker(search.points[NULL].linear)
     sizes = smallest_detectable(ranker, test.threshold)
@@ -232,9 +234,8 @@ def _answer(
         split_by="held-out logs" if kept else "runs" if by_run else "time blocks",
         ladder=ladder(search, whole, kept),
     )
-    answer.remarks = list(doubts.reasons)
+    answer.remarks = list(caveats.reasons)
     if verdict == "partly":
-        left = rest_of(search, best, [e for e in named if e not in sure])
-        answer.rest, answer.next = left.where, left.next
+        answer.rest, answer.next = rest_of(search, best, [e for e in named if e not in sure])
     answer.sentence = phrase(answer)
     return answer

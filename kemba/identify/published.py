@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.types import Array
 from kemba.mechanism import Cylinder, load_cylinder
 from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 

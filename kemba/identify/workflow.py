@@ -4,26 +4,99 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256, write_json
+from kemba.identify.adopt import COVARIANCE, reference, write_model
 from kemba.identify.answer import Answer
+from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.discover import Discovery, discover
+from kemba.identify.infer.colour import with_learnt_colour
+from kemba.identify.infer.windows import error_ratio, free_starts
 from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import BadData, check_logs, sentence
 from kemba.identify.logs.limits import limits_of
 from kemba.identify.logs.reading import read_logs, taken_on
 from kemba.identify.problem.problem import Problem
-from kemba.identify.written.adopt import COVARIANCE, reference, write_model
-from kemba.identify.written.quoted import measured_in, noise_ratio, plant_of
+from kemba.identify.problem.types import Array
 from kemba.logs import load_map
-from kemba.model import Model, load_model, load_spec
+from kemba.mechanism.robot_file import robot_files
+from kemba.model import Model, build_model, load_model, load_spec
+from kemba.model.evidence import Measured
 from kemba.model.spec import evidence_faults
-from kemba.scene import scene_in
+from kemba.scene import Scene, scene_in
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
+
+PLANT = "plant"  # the shipped simulated robot, with physical chambers
+AROUND = 0.01  # s before and after a reading from which a speed is told
+
+
+def _with_learnt_noise(problem: Problem) -> Problem:
+    """The problem under the noise of its own logs, learnt beside a flexible model."""
+    return with_learnt_colour(problem, free_starts(problem))
+
+
+def noise_ratio(problem: Problem, figures: Mapping[str, float] | None = None) -> float:
+    """Error of the model as it is, in units of the noise: `noise_ratio` of `compare`.
+
+    `figures`: of the machine, as `Evidence.figures`; without them all are nominal.
+    """
+    return error_ratio(_with_learnt_noise(problem), _figures_felt(problem, figures or {}))
+
+
+def _figures_felt(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
+    """Those figures of a machine that these logs can feel."""
+    return {name: value for name, value in figures.items() if name in problem.nuisance}
+
+
+def plant_of(model: str | Path, scene: Scene) -> Model:
+    """The shipped plant on the robot of `model` in a scene."""
+    robot = load_spec(model).robot
+    return build_model(load_spec(PLANT).model_copy(update={"robot": robot}), scene=scene)
+
+
+def _measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
+    """What logs span of heights, speeds, supply pressures and valve modes."""
+    spec, body = load_spec(model), [log for log in logs if "body/z" in log]
+    apex = [float(np.nanmax(log["body/z"])) for log in body]
+    speed = [float(np.nanmax(_speed(log))) for log in body]
+    supply = (spec.supply, spec.supply) if spec.supply else None
+    modes = tuple(sorted({mode for log in logs for mode in _modes(log)}))
+    robot = sha256(robot_files(spec.robot)[0]) if spec.robot else None
+    spans = [(min(x), max(x)) if x else None for x in (apex, speed)]
+    load = sum(e.value("m") for e in spec.effects if e.kind == "payload")
+    known: dict[str, Any] = {"modes": modes, "robot": robot, "payload": load}
+    return Measured(apex=spans[0], speed=spans[1], supply=supply, **known)
+
+
+def _speed(log: Trajectory) -> Array:
+    """Speed [m/s] of the body (n,), from places some time apart."""
+    before, after = log.time - AROUND, log.time + AROUND
+    inside = (before >= log.time[0]) & (after <= log.time[-1])
+    steps = [
+        np.interp(after, log.time, log[n]) - np.interp(before, log.time, log[n])
+        for n in ("body/x", "body/z")
+    ]
+    return np.where(inside, np.hypot(*steps) / (2.0 * AROUND), 0.0)
+
+
+def _modes(log: Trajectory) -> set[str]:
+    """Valve modes of a log's legs: extend valve, then retract valve."""
+    legs = {name[: -len("valve/extend")] for name in log.names if name.endswith("valve/extend")}
+    found: set[str] = set()
+    for leg in (leg for leg in legs if f"{leg}valve/retract" in log):
+        pair = np.stack([log[f"{leg}valve/extend"], log[f"{leg}valve/retract"]])
+        both = np.unique(pair[:, np.isfinite(pair).all(axis=0)], axis=1)
+        found |= {f"{extend:.0f}{retract:.0f}" for extend, retract in both.T}
+    return found
+
 
 Paths = Sequence[str | Path]
 QUOTED = 3  # of so many logs one is kept aside for the error that is quoted, where none are given
@@ -50,7 +123,7 @@ def discover_logs(
     fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
     found: Discovery | None = None
     try:
-        _apart(fitted, kept)
+        _check_disjoint(fitted, kept)
         fitted, kept, said = _kept_aside(fitted, kept)
         built = model_of(fitted, model)
         checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
@@ -103,7 +176,7 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
         answer.error_after = noise_ratio(written, answer.machine)
         if answer.error_after > answer.error_before:
             answer.drop_model()
-    answer.told_in(before)
+    answer.rescaled_from(before)
 
 
 def _evidence(
@@ -124,7 +197,7 @@ def _evidence(
         "error_held_out": answer.error_after,
         "error_plant": plant,
         "figures": {name: float(f"{x:.6g}") for name, x in answer.machine.items()},
-        "measured": measured_in([*fitted, *kept], model).model_dump(exclude_none=True),
+        "measured": _measured_in([*fitted, *kept], model).model_dump(exclude_none=True),
     }
 
 
@@ -203,10 +276,65 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     write_json(out / "answer.json", data | {"base": reference(model)})
 
 
-def _apart(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
+def _check_disjoint(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
     """A held-out log must not be fitted as well."""
     both = {Path(t.meta["path"]).resolve() for t in fitted} & {
         Path(t.meta["path"]).resolve() for t in kept
     }
     if both:
         raise KembaError("--holdout", f"{sorted(both)[0].name} is also among the logs to be fitted")
+
+
+PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
+
+
+def compare_logs(
+    logs: Sequence[str | Path],
+    model: str = "planning",
+    column_map: str | Path | None = None,
+    run: str | Path | None = None,
+    tell: Tell = silent,
+) -> tuple[Comparison, Problem]:
+    """Where `model` fails on these logs, and how far a planned `run` (a folder or a trajectory
+    CSV) was missed. `tell` gets the name of every stage. Raises KembaError; BadData where the logs
+    cannot be right."""
+    columns = load_map(column_map) if column_map else None
+    tell("reading the logs")
+    read = read_logs(logs, columns)
+    found, problem = compare_read(read, model, tell)
+    if run is not None:
+        plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
+        found = replace(found, plan=missed(plan, read))
+    return found, problem
+
+
+def compare_read(
+    read: Sequence[Trajectory], model: str, tell: Tell = silent
+) -> tuple[Comparison, Problem]:
+    """Where `model` fails on logs that were read. Raises as `compare_logs` does."""
+    built = model_of(read, model)
+    check_all(read, built)
+    tell("finding the motion in the logs")
+    problem, _ = admitted(read, built)
+    tell("learning the noise of the sensors")
+    problem = _with_learnt_noise(problem)
+    tell("comparing with the model")
+    evidence = load_spec(model).evidence
+    figures = _figures_felt(problem, evidence.figures) if evidence else {}
+    return compare(problem, model, [str(log.meta["path"]) for log in read], figures), problem
+
+
+def missed(plan: Trajectory, logs: Sequence[Trajectory]) -> Mapping[str, float]:
+    """Largest distance of the logs from the plan, by header, while the plan lasts."""
+    found: dict[str, float] = {}
+    for log in logs:
+        begun = min(log.time[0], 0.0) + plan.time[0]  # what comes before the plan is negative
+        time = log.time - log.time[0] + begun
+        during = (plan.time[0] <= time) & (time <= plan.time[-1])
+        wanted = plan.interpolate(time[during])
+        for name in wanted.names:
+            if name in log and name.endswith(PLANNED):
+                error = np.abs(log[name][during] - wanted[name])
+                header = f"{name} [{log.unit(name)}]"
+                found[header] = max(found.get(header, 0.0), float(np.nanmax(error)))
+    return found

@@ -13,11 +13,11 @@ import numpy as np
 from kemba.config import Document, beside, dump_yaml
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256
+from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
-from kemba.identify.written.adopt import reference, write_model
 from kemba.learn import outcome
 from kemba.learn.correction import (
     Aim,

@@ -13,9 +13,8 @@ import numpy as np
 
 from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 from kemba.identify.compare.compare import Comparison
-from kemba.identify.compare_logs import compare_read
 from kemba.identify.problem.types import MissingForce
-from kemba.identify.workflow import check_all, model_of
+from kemba.identify.workflow import check_all, compare_read, model_of
 from kemba.report.charts import COMPARED, Book, Chart, Curve, meter, picture, table
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory

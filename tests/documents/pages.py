@@ -19,7 +19,7 @@ ELSEWHERE = {
     "examples.md": "tests/identify/test_examples.py",
     "gallery.md": "tests/test_examples.py",
     "tutorial.md": "tests/documents/test_tutorial.py",
-    "experiment.md": "tests/identify/test_experiment.py",
+    "experiment.md": "tests/identify/design/test_experiment.py",
 }
 
 

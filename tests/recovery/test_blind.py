@@ -10,10 +10,9 @@ pytest.importorskip("numba")
 
 from twin.cases import bench_case
 
+from kemba.identify.adopt import adopted
 from kemba.identify.answer import Answer
-from kemba.identify.compare_logs import compare_logs
-from kemba.identify.workflow import discover_logs
-from kemba.identify.written.adopt import adopted
+from kemba.identify.workflow import compare_logs, discover_logs
 from kemba.model import load_spec
 
 FAST = {"seal_friction": 3, "valve_delay": 1}

@@ -12,10 +12,9 @@ from robot_logs import hops
 from twin.cases import robot_case
 
 from kemba.identify.answer import Answer
-from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import discover
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.workflow import discover_logs
+from kemba.identify.workflow import compare_logs, discover_logs
 from kemba.model.spec import load_model, load_spec
 
 

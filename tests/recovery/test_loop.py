@@ -14,10 +14,9 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue
 
-from kemba.identify.compare_logs import compare_logs
 from kemba.identify.discover import discover
 from kemba.identify.robot.problem import robot_problem
-from kemba.identify.workflow import write_answer
+from kemba.identify.workflow import compare_logs, write_answer
 from kemba.model.spec import load_model
 from kemba_cli.main import app
 

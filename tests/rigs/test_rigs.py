@@ -16,9 +16,8 @@ from typer.testing import CliRunner
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
-from kemba.identify.compare_logs import compare_logs
-from kemba.identify.rigs.files import characterise_logs
-from kemba.identify.workflow import discover_logs
+from kemba.identify.rigs.characterise import characterise_logs
+from kemba.identify.workflow import compare_logs, discover_logs
 from kemba.model import load_model
 from kemba_cli.main import app
 

@@ -25,7 +25,7 @@ ALLOWED = {
     "kemba/mechanism/__init__.py",
     "kemba/model/spec.py",
     "kemba/plant/repeat.py",
-    "kemba/identify/written/quoted.py",
+    "kemba/identify/workflow.py",
     "kemba/solve/truth.py",
     "cli/verbs/check.py",
     "cli/schemas.py",

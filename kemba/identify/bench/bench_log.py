@@ -14,10 +14,9 @@ from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
 from kemba.identify.logs.excerpt import held
 from kemba.identify.logs.limits import LimitSettings
-from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.problem.problem import Array, Flags
-from kemba.identify.problem.quantisation import telling
+from kemba.identify.problem.noise import difference_sigma, telling
 from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
@@ -94,9 +93,9 @@ def prepare(
     motion = smooth_motion(log.time, log["piston/x"], noise=noise, **speed)
     sent = [held(log[f"valve/{c}"]) for c in ("extend", "retract")]
     measured = {c: log[c] for c in ("piston/F", *PRESSURES) if c in log}
-    sigma = {c: noise_of(c, y) for c, y in measured.items()}
+    sigma = {c: _noise_of(c, y) for c, y in measured.items()}
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
-    known = ~unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
+    known = ~_unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & known & telling(y, sigma[c]) for c, y in measured.items()}
     within = 0.0 if on_rows else _seen_within(log.time)
     # a change that a row shows happened since the row before
@@ -112,7 +111,7 @@ def _seen_within(time: Array) -> float:
     return step if step > LimitSettings.row else 0.0
 
 
-def noise_of(channel: str, y: Array) -> float:
+def _noise_of(channel: str, y: Array) -> float:
     """White noise (1 sigma) of a sample, from readings y (n,), in their unit.
 
     It is never below a small least noise, so that simulated logs without any noise can be judged.
@@ -123,7 +122,7 @@ def noise_of(channel: str, y: Array) -> float:
     return max(difference_sigma(y), least + settings.finest_share * spread)
 
 
-def unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
+def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
     """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
 
     Where a valve switched within a gap, the moment is not known. The rows after such a gap count

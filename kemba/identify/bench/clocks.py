@@ -15,10 +15,11 @@ from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.evidence.colour import best_fit
-from kemba.identify.evidence.linear import Linear, condense, names_of, priors
-from kemba.identify.logs.settings import GateSettings
-from kemba.identify.problem.problem import Problem, Theta
+from kemba.identify.infer.colour import best_fit
+from kemba.identify.infer.linear import Linear, condense, names_of, priors
+from kemba.identify.logs.reading import GateSettings
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Theta
 from kemba.trajectory import Trajectory
 
 COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta
@@ -58,7 +59,7 @@ def nuisance(drift: Drift | None) -> dict[str, tuple[float, float]]:
     return dict.fromkeys(moved, (0.0, ClockSettings.rate))
 
 
-def by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
+def _by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
     """A run with commands and motion as the clock of the force would have written them."""
     moved = commands_by_one_clock(run, theta)
     return replace(moved, motion=motion_by_one_clock(run.motion, theta))
@@ -145,7 +146,7 @@ class _Linearised:
     def cost(self, theta: Theta) -> float:
         """What the best fit about theta leaves."""
         at, r = priors(self.problem, theta, self.names), self.problem.residual(theta)
-        return least_cost(condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int)))
+        return _least_cost(condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int)))
 
 
 def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[float, Drift]:
@@ -160,7 +161,7 @@ def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[fl
     return float(found.fun), (owner, float(found.x))
 
 
-def least_cost(linear: Linear) -> float:
+def _least_cost(linear: Linear) -> float:
     """Half the sum of squares that the best fit leaves, with what its priors cost."""
     z = best_fit(linear)
     (gram, slope, power), step = linear.total, z - linear.at
@@ -177,7 +178,7 @@ def without_drift(log: BenchLog, owner: str, rate: float) -> BenchLog:
     if OWNERS[owner].keys() == {COMMANDS} and not log.seen_within:
         row = float(np.median(np.diff(log.motion.time)))
         log = replace(log.sent(-0.5 * row), seen_within=row)
-    moved, time = by_one_clock(log, _theta(owner, rate)), log.motion.time
+    moved, time = _by_one_clock(log, _theta(owner, rate)), log.motion.time
     gained = max(0.0, *_theta(owner, rate).values())
     known = time <= time[0] + (time[-1] - time[0]) / (1.0 + gained)
     return replace(moved, keep={channel: k & known for channel, k in log.keep.items()})

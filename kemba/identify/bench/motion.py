@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import toeplitz
+from scipy.ndimage import maximum_filter1d
 
 from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.problem.problem import Array
-from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.problem.sensor_noise import (
+    ChannelNoise,
+    ColourSettings,
+    Kind,
+    chosen_noise,
+    covariances,
+    pairs,
+    weighted,
+)
+from kemba.identify.problem.types import Array, Flags
 
-
-class MotionSettings:
-    """How the velocity of an imposed motion is found."""
-
-    finest = 2e-6  # smallest noise of the position sensor [m]
-    # half widths, in samples, of the windows that are tried: each about 1.4 times the one before
-    half_widths = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)
-    measured = 0.5  # share of valid readings that a measured velocity needs
-    width = 6  # half width, in samples, of its smoothing
-    finest_speed = 1e-6  # smallest noise of a velocity sensor [m.s-1]
-    contradicts = 3.0  # sigmas by which a measured velocity may differ: three sigmas
+# How the velocity of an imposed motion is found.
+FINEST = 2e-6  # smallest noise of the position sensor [m]
+# half widths, in samples, of the windows that are tried: each about 1.4 times the one before
+HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)
+MEASURED = 0.5  # share of valid readings that a measured velocity needs
+WIDTH = 6  # half width, in samples, of its smoothing
+FINEST_SPEED = 1e-6  # smallest noise of a velocity sensor [m.s-1]
+CONTRADICTS = 3.0  # sigmas by which a measured velocity may differ: three sigmas
 
 
 @dataclass(frozen=True)
@@ -48,19 +55,19 @@ def smooth_motion(
     [m.s-1] is averaged with the derived one, by their errors. `noise` of the position sensor, in
     `difference_sigma` of x; None: white.
     """
-    settings, good = MotionSettings, np.isfinite(x)
+    good = np.isfinite(x)
     noise = noise or ChannelNoise()
-    grid, values, step = even_grid(time, x)
-    sigma = max(difference_sigma(x[good]), settings.finest)
+    grid, values, step = _even_grid(time, x)
+    sigma = max(difference_sigma(x[good]), FINEST)
     position, rate, spread, half = _adaptive(values, sigma, step, noise)
-    if v is not None and np.isfinite(v).sum() > settings.measured * len(v):
+    if v is not None and np.isfinite(v).sum() > MEASURED * len(v):
         rate, spread = _weigh_in(grid, rate, spread, half, time, v)
     a = np.gradient(_mean(rate, 3), step)
     x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
     return SmoothedMotion(time, x, v, a, spread, sigma * noise.spread)
 
 
-def even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
+def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
     """Even times (m,) [s] of about the same step, x (m,) there, and the step [s]; rows without a
     value are bridged."""
     good = np.isfinite(x)
@@ -82,7 +89,7 @@ def _adaptive(
     n = len(values)
     best = np.full(n, np.inf)
     position, rate, half = values.copy(), np.zeros(n), np.zeros(n)
-    for width in MotionSettings.half_widths:
+    for width in HALF_WIDTHS:
         if 2 * width + 1 > n:
             break
         x, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
@@ -120,14 +127,14 @@ def _weigh_in(
 
     Where the two contradict each other, the derived one counts alone.
     """
-    settings, good = MotionSettings, np.isfinite(v)
+    good = np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
-    sigma = max(difference_sigma(v[good]), settings.finest_speed)
-    width = settings.width
+    sigma = max(difference_sigma(v[good]), FINEST_SPEED)
+    width = WIDTH
     smoothed = _mean(measured, width)
     sd = np.full(len(grid), sigma / np.sqrt(2 * width + 1))
     gap = np.median(np.abs(smoothed - rate) / np.hypot(sd, spread))
-    if gap > settings.contradicts:
+    if gap > CONTRADICTS:
         return rate, spread
     weight = spread**2 / (spread**2 + sd**2)
     return rate + weight * (smoothed - rate), np.sqrt(weight) * sd
@@ -137,3 +144,68 @@ def _mean(values: Array, width: int) -> Array:
     """Moving average over 2 width + 1 samples, shrinking at the ends."""
     kernel = np.ones(2 * width + 1)
     return np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")
+
+
+# Where the piston rests, and what is believed of the noise there.
+QUIET_WIDTH = 135  # half width, in samples, of the cubic
+REST = 2e-3  # speed up to which the piston rests [m.s-1]
+# largest noise that is believed, in sigmas told from differences of rows: third differences
+# show a tenth of AR(1) noise of 0.98 per row
+MOST = 10.0
+
+
+@dataclass(frozen=True)
+class _Quiet:
+    """One log on an even grid: what the cubic leaves (n,) in sigmas, where it rests, step [s]."""
+
+    left: Array
+    rest: Flags
+    step: float
+
+
+def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
+    """Noise of the position sensor that all `logs` (times [s] and positions [m], both (n,)) share,
+    in each log's `difference_sigma`; white where the piston rests too little to tell."""
+    quiet = [found for time, x in logs if (found := _quiet(time, x)) is not None]
+    settings = ColourSettings
+    if sum(int(q.rest.sum()) for q in quiet) < settings.fewest:
+        return ChannelNoise()
+    n = max(len(q.left) for q in quiet)
+    errors = np.full((n, len(quiet), 1), np.nan)
+    for i, q in enumerate(quiet):
+        errors[: len(q.left), i, 0] = np.where(q.rest, q.left, np.nan)
+    step = float(np.median([q.step for q in quiet]))
+    memories = (0.0, *settings.memories)
+    columns = [_expected(memory, step) for memory in memories]
+    counts = pairs(errors)
+    measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
+    kinds = [Kind(0, memory) for memory in memories]
+    most = np.array([MOST])
+    a, b = weighted(columns, measured, counts)
+    return chosen_noise(a, b, kinds, most, np.array([True]))[0]
+
+
+def _quiet(time: Array, x: Array) -> _Quiet | None:
+    """A log without its motion; None where it is too short."""
+    width = QUIET_WIDTH
+    grid, values, step = _even_grid(time, x)
+    if len(grid) < 2 * width + 1:
+        return None
+    smooth, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
+    rest = maximum_filter1d(np.abs(v), 2 * width + 1) < REST
+    rest[:width] = rest[-width:] = False
+    sigma = max(difference_sigma(x[np.isfinite(x)]), FINEST)
+    return _Quiet((values - smooth) / sigma, rest, step)
+
+
+def _expected(memory: float, step: float) -> Array:
+    """Autocovariances (1, lags) of what the cubic leaves of noise of unit sigma and this memory
+    [s], on an even grid of this `step` [s]."""
+    width, lags = QUIET_WIDTH, np.array(ColourSettings.lags)
+    left = np.eye(1, 4 * width + 1, 2 * width)[0]
+    left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
+    reach = np.convolve(left, left[::-1])
+    apart = np.arange(len(reach)) - len(left) + 1
+    noise = ChannelNoise(0.0, ((1.0, memory),)) if memory else ChannelNoise()
+    found = [reach @ noise.covariance(step * (apart - lag)) for lag in lags]
+    return np.array(found)[None, :]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.effects.base import Effect
 from kemba.effects.pneumatics.constants import ATMOSPHERE
 from kemba.effects.pneumatics.switching import delayed
 from kemba.effects.series import Series
@@ -15,52 +14,34 @@ from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.bench.rig_model import Prediction, RigModel, share
-from kemba.identify.problem.candidates import by_default, switched_on
-from kemba.identify.problem.nominal import nominal_figures
-from kemba.identify.problem.problem import Array, Candidate, Theta
+from kemba.identify.problem.candidates import CompiledModels, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults
+from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.mechanism import Cylinder
 from kemba.model.model import Model
 
 SENT_LATE = "sent:late"  # nuisance of slow logs [s]: by how much all commands were sent later
 
 
-class BenchPredictor:
-    """Rigs of one model, each compiled once with the effects that theta switches on.
+class BenchPredictor(CompiledModels[RigModel]):
+    """Rigs of one model.
 
-    `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
     `exact`: what a late force sensor shows is computed at its own times, not read off between rows.
     """
 
     exact = False
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
-        self.model, self.candidates = model, candidates
-        self.figures = nominal_figures(model)
+        super().__init__(model, candidates, nominal_figures(model), RigModel)
         self.sensors = SensorFaults(model.effects)
-        self._rigs: dict[tuple[str, ...], RigModel] = {}
-
-    def rig(self, theta: Theta) -> RigModel:
-        """The rig with the effects on its list that theta switches on."""
-        active = switched_on(self.candidates, theta)
-        if active not in self._rigs:
-            extra = [by_default(self.candidates[name].effect) for name in active]
-            model = self.model.with_effects(_unlike(self.model, extra))
-            keys = (key for name in active for key in tuple(self.candidates[name].keys()))
-            free = tuple(key for key in keys if key in model.parameters)
-            self._rigs[active] = RigModel(model, free, tuple(self.figures))
-        return self._rigs[active]
 
     def predict(
         self, run: BenchLog, theta: Theta, start: Mapping[str, float] | None = None
     ) -> Prediction:
         """What happens on the rig, before any sensor; where `exact`, at the times that the force of
         a row is of. `start`: by how much states differ from rest when the log begins."""
-        rig = self.rig(theta)
-        nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        values = {name: theta.get(name, nominal.get(name, 0.0)) for name in rig.names}
-        sent = self.sent(run, theta)
-        late = self._shift(theta)
+        rig, sent, late = self.at(theta), self.sent(run, theta), self._shift(theta)
+        values = self.values(theta, rig.names)
         return rig.predict(self.true_motion(run, theta), sent.commands, values, start or {}, late)
 
     def _shift(self, theta: Theta) -> float:
@@ -106,16 +87,10 @@ class BenchPredictor:
 
     def acting(self, run: BenchLog, theta: Theta) -> Array:
         """Share of each sample's neighbourhood in which the valves act (n, 2)."""
-        delays = self.rig(theta).timing(theta)
+        delays = self.at(theta).timing(theta)
         times = run.motion.time
         sent = self.sent(run, theta).commands
         return np.stack([share(delayed(c, *delays), times) for c in sent], axis=1)
-
-
-def _unlike(model: Model, extra: list[Effect]) -> list[Effect]:
-    """Effects not on the model's list already; those that are stay as they are."""
-    names = {e.name for e in model.effects}
-    return [e for e in extra if e.name not in names]
 
 
 def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylinder) -> Array:
@@ -126,3 +101,99 @@ def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylin
     area = cylinder.area_extend if chamber == "extend" else cylinder.area_retract
     with np.errstate(over="ignore"):  # the states of a model far from the data may diverge
         return np.asarray(ATMOSPHERE + states[f"chamber/{chamber}/F"] / area)
+
+
+# beginning of a log that tells whether a valve had just been switched [s]: twice the slowest
+# rise time of Table I
+EARLY = 0.08
+
+
+@dataclass(frozen=True)
+class PredictedLogs:
+    """Bench logs with the predictor of one model.
+
+    `starts`: name in theta -> (index of the log, name of the state), for every state whose value at
+    the start of a log is free.
+    """
+
+    logs: tuple[BenchLog, ...]
+    predictor: BenchPredictor
+    starts: Mapping[str, tuple[int, str]]
+
+    @property
+    def stroke(self) -> float:
+        """Stroke of the cylinder [m]."""
+        return self.predictor.model.mechanism.stroke
+
+    def readings(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
+        """Channel of log `index` -> what should have been measured (n,) and its variance (n,), in
+        the channel's unit."""
+        start = {name: theta.get(key, 0.0) for key, (i, name) in self.starts.items() if i == index}
+        return self.predictor.readings(self.logs[index], theta, start)
+
+    def standardised(self, theta: Theta, index: int) -> dict[str, Array]:
+        """Channel of log `index` -> (predicted - measured) / sigma of its rows, not whitened."""
+        return standardised(self.logs[index], self.readings(theta, index))
+
+    def motion(self, theta: Theta, index: int) -> SmoothedMotion:
+        """The motion of log `index` without the position sensor's faults."""
+        return self.predictor.true_motion(self.logs[index], theta)
+
+    def acting(self, theta: Theta, index: int) -> Array:
+        """Share of each sample's neighbourhood in which the two valves act (n, 2)."""
+        return self.predictor.acting(self.logs[index], theta)
+
+
+def standardised(log: BenchLog, readings: Mapping[str, tuple[Array, Array]]) -> dict[str, Array]:
+    """Channel -> (predicted - measured) / sigma (k,) of the rows that count.
+
+    `readings`: channel -> predicted values (n,) and variances (n,).
+    """
+    return {
+        c: ((y - log.measured[c]) / np.sqrt(variance))[log.keep[c]]
+        for c, (y, variance) in readings.items()
+    }
+
+
+def settle_starts(logs: Iterable[BenchLog], predictor: BenchPredictor) -> tuple[BenchLog, ...]:
+    """The logs with the first valve pulse as the data have it.
+
+    A valve that is on in the first row may have been on for long, or may just have been switched.
+    The force in the first moments decides.
+    """
+    return tuple(_timed(_settled(log, predictor), predictor) for log in logs)
+
+
+def _timed(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
+    """A slow log with the variance that the unknown moments of its switchings make.
+
+    Each command was sent at any time between two rows. So its moment has the standard deviation of
+    a row over sqrt(12), and a reading that of the change between the first and the last moment.
+    """
+    if not log.seen_within:
+        return log
+    early, late = (predictor.readings(log.sent(by * log.seen_within), {}, {}) for by in (-0.5, 0.5))
+    changes = {c: late[c][0] - early[c][0] for c in log.measured}
+    return replace(log, by_timing={c: change**2 / 12.0 for c, change in changes.items()})
+
+
+def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
+    options = [_begun(c, log.motion.time[0]) for c in log.commands]
+    trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
+    if len(trials) == 1:
+        return log
+    end = log.motion.time[0] + EARLY
+    early = log.motion.time[log.keep["piston/F"]] < end
+
+    def cost(trial: BenchLog) -> float:
+        r = standardised(trial, predictor.readings(trial, {}, {}))["piston/F"]
+        return float(np.mean(np.abs(r[early])))
+
+    return min(trials, key=cost)
+
+
+def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tuple[float, float]]]:
+    """The pulses as they are, and with the first one switched on when the log starts."""
+    if not intervals or np.isfinite(intervals[0][0]):
+        return [intervals]
+    return [intervals, [(start, intervals[0][1]), *intervals[1:]]]

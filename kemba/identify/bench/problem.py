@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
@@ -13,21 +13,20 @@ from typing_extensions import Self
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
 from kemba.identify.bench.bench_log import BenchLog, prepare
-from kemba.identify.bench.beyond import formula_columns, leftover
-from kemba.identify.bench.missing import bench_missing
-from kemba.identify.bench.operating_point import (
+from kemba.identify.bench.forces import (
     bench_force_channel,
+    bench_missing,
     bench_operating_point,
+    formula_columns,
+    leftover,
     switchings,
 )
-from kemba.identify.bench.predicted import PredictedLogs, settle_starts
-from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor
-from kemba.identify.bench.quiet import position_noise
+from kemba.identify.bench.motion import position_noise
+from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, PredictedLogs, settle_starts
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
-from kemba.identify.problem.noise import Colour, colours, whiten, whitened
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.noise import ColouredProblem, colours, whiten
 from kemba.identify.problem.types import (
     Array,
     Candidate,
@@ -42,28 +41,20 @@ from kemba.identify.problem.types import (
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class BenchProblemSettings:
-    """How well pressure sensors are known, and what counts as a change and as rest."""
-
-    # prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
-    # atmosphere's or that of a vacuum
-    pressure_zero = 2e5
-    # prior sigma of the scale error of a pressure sensor: nominal figures are off by 1 to 3 %
-    pressure_gain = 0.02
-    step = 0.1  # step of finite differences of a start, as a share of the state's scale
-    rest = 2e-3  # speed below which the piston rests [m.s-1]
+# prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
+# atmosphere's or that of a vacuum
+PRESSURE_ZERO = 2e5
+# prior sigma of the scale error of a pressure sensor: nominal figures are off by 1 to 3 %
+PRESSURE_GAIN = 0.02
+STEP = 0.1  # step of finite differences of a start, as a share of the state's scale
+REST = 2e-3  # speed below which the piston rests [m.s-1]
 
 
-class BenchProblem(Problem):
+class BenchProblem(ColouredProblem):
     """Residuals of bench runs; effects join the model's list when theta switches them on.
 
-    `colour`: noise colour by run and channel; without any, residuals are not whitened. `left` (n,):
-    the residual from which it was learnt. `drift`: whose clock gained on the others before the logs
-    were put on one clock, and its rate.
+    `drift`: whose clock gained on the others before the logs were put on one clock, and its rate.
     """
-
-    learns_colour = True
 
     def __init__(
         self,
@@ -82,7 +73,7 @@ class BenchProblem(Problem):
         hidden = {n: c for n, c in self.candidates.items() if _within(c, row)}
         self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
         predictor = BenchPredictor(model, self.candidates)
-        states = predictor.rig({}).state_names
+        states = predictor.at({}).state_names
         starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
         self.nuisance = predictor.figures | predictor.sensors.nuisance | clocks.nuisance(drift)
@@ -92,12 +83,9 @@ class BenchProblem(Problem):
         self._state_scale = {q.name: q.scale for q in model.states.values()}
         for key, (_, name) in starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
-        known = BenchProblemSettings
         for channel in self.channels[1:]:
-            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, known.pressure_zero)
-            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, known.pressure_gain)
-        self.colour: Mapping[tuple[int, int], Colour] = {}
-        self.left: Array | None = None
+            self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, PRESSURE_ZERO)
+            self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, PRESSURE_GAIN)
 
     @property
     def logs(self) -> tuple[BenchLog, ...]:
@@ -108,48 +96,44 @@ class BenchProblem(Problem):
     def channels(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(c for log in self.logs for c in log.measured))
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         """Whitened residuals (n,), run by run, then channel by channel."""
         parts = []
-        for i in range(len(self.logs)) if runs is None else runs:
+        for i in range(len(self.logs)):
             for channel, r in self.predicted.standardised(theta, i).items():
                 colour = self.colour.get((i, self.channels.index(channel)))
                 parts.append(r if colour is None else whiten(r, colour))
         return np.concatenate(parts)
 
-    def jacobian(
-        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-    ) -> Array:
+    def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """Secants (n, k); the start of a log moves its own rows only."""
         names = list(names)
         starts = self.predicted.starts
         plain = [n for n in names if n not in starts]
-        columns = dict(zip(plain, super().jacobian(theta, plain, runs).T, strict=True))
-        columns |= self._start_columns(theta, [n for n in names if n in starts], runs)
+        columns = dict(zip(plain, super().jacobian(theta, plain).T, strict=True))
+        columns |= self._start_columns(theta, [n for n in names if n in starts])
         return np.stack([columns[n] for n in names], axis=1)
 
-    def _start_columns(
-        self, theta: Theta, names: list[str], runs: Collection[int] | None
-    ) -> dict[str, Array]:
+    def _start_columns(self, theta: Theta, names: list[str]) -> dict[str, Array]:
         """Columns (n,) of the initial states: one evaluation moves the starts of all runs."""
         if not names:
             return {}
-        starts, share = self.predicted.starts, BenchProblemSettings.step
-        at = self.rows(runs).run
-        base = self.residual(theta, runs)
+        starts, share = self.predicted.starts, STEP
+        at = self.rows().run
+        base = self.residual(theta)
         columns: dict[str, Array] = {}
         for state in {starts[n][1] for n in names}:
             own = {n: starts[n][0] for n in names if starts[n][1] == state}
             step = {n: theta.get(n, 0.0) + share * self._state_scale[state] for n in own}
-            change = self.residual({**theta, **step}, runs) - base
+            change = self.residual({**theta, **step}) - base
             slope = change / (share * self._state_scale[state])
             columns |= {n: np.where(at == i, slope, 0.0) for n, i in own.items()}
         return columns
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
-        rest = BenchProblemSettings.rest
+    def rows(self) -> Rows:
+        rest = REST
         parts: list[tuple[np.ndarray, ...]] = []
-        for i in range(len(self.logs)) if runs is None else runs:
+        for i in range(len(self.logs)):
             log = self.logs[i]
             for c in log.measured:
                 keep = log.keep[c]
@@ -194,13 +178,6 @@ class BenchProblem(Problem):
         """Force residual, and what a force could depend on."""
         return leftover(self.predicted, theta, self.candidates)
 
-    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
-        """The same problem with the colour of every run and channel learnt from `residual` (n,), or
-        forgotten."""
-        found, found.left = copy(self), residual
-        found.colour = {} if residual is None else colours(self.rows(), residual, careful)
-        return found
-
     def drifting(self) -> Self | None:
         """The same problem with sensors that may also drift, by as much as their stated noise."""
         if self.left is None or any(c.drift for c in self.colour.values()):
@@ -219,10 +196,6 @@ class BenchProblem(Problem):
         predictor.exact = True
         found.predicted = replace(self.predicted, predictor=predictor)
         return found
-
-    def whiten(self, columns: Array) -> Array:
-        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
-        return whitened(self.rows(), columns, self.colour)
 
     def validate(self) -> list[str]:
         """A remark on clocks that drift apart. Raises BadData where columns must be mixed up."""

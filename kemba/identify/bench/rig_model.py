@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -13,7 +12,7 @@ import numpy as np
 from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.effects.series import Series
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.types import Array
 from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
 from kemba.model.node import Node
@@ -23,16 +22,11 @@ from kemba.model.rest import Rest, rate_of
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
 
 Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
-
-
-class RigModelSettings:
-    """Integration of the chambers along an imposed motion."""
-
-    step = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
-    chunk = 512  # steps per call of a compiled function
-    # time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1
-    # ms; a log does not say on which side its sample was taken
-    blur = 0.75e-3
+STEP = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
+CHUNK = 512  # steps per call of a compiled function
+# time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1
+# ms; a log does not say on which side its sample was taken
+BLUR = 0.75e-3
 
 
 @dataclass(frozen=True)
@@ -51,7 +45,7 @@ class RigModel:
     def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
         self.model, self.names = model, (*free, *scaled)
         node = model.build(free, scaled)
-        self._state_names = [q.name for q in model.states.values()]
+        self.state_names = tuple(q.name for q in model.states.values())
         rate = rate_of(node)
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
@@ -94,7 +88,7 @@ class RigModel:
         n, moved = len(seen), Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
         x, (v0, a) = moved.value, moved.rates
         fixed = np.repeat(p[:, None], n, axis=1)
-        states = dict(zip(self._state_names, s, strict=True))
+        states = dict(zip(self.state_names, s, strict=True))
         out = self._mapped("output", n)(s, x, v0, a, blurred, fixed)
         force = V_MIDDLE * out[0]
         for place, weight in V_NODES:
@@ -107,11 +101,11 @@ class RigModel:
     ) -> Array:
         middle = 0.5 * (times[:-1] + times[1:])
         s0 = self._rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
-        s0 += np.array([start.get(name, 0.0) for name in self._state_names])
+        s0 += np.array([start.get(name, 0.0) for name in self.state_names])
         n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
         inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
-        chunk = RigModelSettings.chunk
+        chunk = CHUNK
         inputs = np.pad(inputs, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
         fixed = np.repeat(p[:, None], chunk, axis=1)
         step, states = self._mapped("step", chunk), [s0[:, None]]
@@ -124,10 +118,6 @@ class RigModel:
             one = self._functions[kind]
             self._maps[kind, n] = _Call(one.mapaccum(n) if kind == "step" else one.map(n))
         return self._maps[kind, n]
-
-    @cached_property
-    def state_names(self) -> tuple[str, ...]:
-        return tuple(self._state_names)
 
 
 class _Call:
@@ -162,7 +152,7 @@ def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
     m depends on the number of events only, so that compiled functions can be used again.
     """
     inside = np.clip(events, samples[0], samples[-1])
-    pieces = np.ceil(np.diff(samples) / RigModelSettings.step - 1e-6).astype(int)
+    pieces = np.ceil(np.diff(samples) / STEP - 1e-6).astype(int)
     fill = [
         np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
         for i in np.flatnonzero(pieces > 1)
@@ -182,7 +172,7 @@ def share(intervals: Array, times: Array) -> Array:
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    blur = RigModelSettings.blur
+    blur = BLUR
     later = np.interp(times + blur, knots, on_time)
     earlier = np.interp(times - blur, knots, on_time)
     return np.asarray(np.clip((later - earlier) / (2 * blur), 0.0, 1.0))

@@ -9,25 +9,19 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
-from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.problem.problem import Array
+from kemba.identify.problem.types import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
-
-
-class BenchValidateSettings:
-    """When the columns of a bench log are said to be mixed up."""
-
-    better = 4.0  # factor by which a mix-up must fit better
-    small = 4.0  # error, in sigmas, that no mix-up would leave
-    close = 0.25  # share of the force's spread that a mix-up may leave
-    nothing = 1.2  # share of the spread left by a model that explains nothing
-    latest = 0.015  # a longer lag is no sensor's delay but another clock [s]
-    resolution = 1e-3  # resolution of lags [s]: a usual row
-    shortest = 400  # steps of resolution that a lag can be read from
-    farthest = 0.5  # longest lag [s]
-    alike = 0.3  # correlation that a lag must reach
-    more_alike = 1.5  # factor by which a lag must raise the correlation
+BETTER = 4.0  # factor by which a mix-up must fit better
+SMALL = 4.0  # error, in sigmas, that no mix-up would leave
+CLOSE = 0.25  # share of the force's spread that a mix-up may leave
+NOTHING = 1.2  # share of the spread left by a model that explains nothing
+LATEST = 0.015  # a longer lag is no sensor's delay but another clock [s]
+RESOLUTION = 1e-3  # resolution of lags [s]: a usual row
+SHORTEST = 400  # steps of resolution that a lag can be read from
+FARTHEST = 0.5  # longest lag [s]
+ALIKE = 0.3  # correlation that a lag must reach
+MORE_ALIKE = 1.5  # factor by which a lag must raise the correlation
 
 
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
@@ -39,15 +33,13 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
         "piston/F has the reversed sign (pushing is positive)",
         replace(run, measured={**run.measured, "piston/F": -force}),
     )
-    yield (
-        "valve/extend and valve/retract are swapped",
-        replace(run, commands=(retract, extend)),
-    )
+    yield ("valve/extend and valve/retract are swapped", replace(run, commands=(retract, extend)))
     yield (
         "valve/extend and valve/retract are inverted (1 is on)",
         replace(run, commands=(_inverted(extend), _inverted(retract))),
     )
-    flipped = _flipped(run.motion, stroke)
+    motion = run.motion
+    flipped = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
     yield "piston/x counts from the extended end (0 is retracted)", replace(run, motion=flipped)
     for factor, unit in ((1e3, "kN"), (1e-3, "mN"), (4.4482, "lbf"), (9.81, "kgf")):
         yield (
@@ -62,18 +54,18 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
 
 def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[KembaError]:
     """What must be wrong with a run's columns, if anything."""
-    path, limits = run.name, BenchValidateSettings
+    path = run.name
     error, scale = _misfit(run, predict)
-    if error < limits.small * run.sigma["piston/F"]:
+    if error < SMALL * run.sigma["piston/F"]:
         return []
     trials = [(text, _misfit_mixed_up(trial, predict)) for text, trial in mix_ups(run, stroke)]
     text, (best, spread) = min(trials, key=lambda t: t[1][0] / t[1][1])
-    if best / spread < limits.close and best / spread * limits.better < error / scale:
+    if best / spread < CLOSE and best / spread * BETTER < error / scale:
         return [KembaError(path, text, "the force answers the valves so much better then")]
     lagging = _clock(run, predict)
     if lagging:
         return lagging
-    if error > limits.nothing * scale and scale > 0:
+    if error > NOTHING * scale and scale > 0:
         return [
             KembaError(
                 path,
@@ -106,16 +98,16 @@ def _misfit_mixed_up(trial: BenchLog, predict: Predict) -> tuple[float, float]:
 
 def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     """A force that comes much later or earlier than any sensor's delay has another clock."""
-    keep, limits = run.keep["piston/F"], BenchValidateSettings
-    grid = np.arange(run.motion.time[0], run.motion.time[-1], limits.resolution)
-    if len(grid) < limits.shortest or not any(run.commands):
+    keep = run.keep["piston/F"]
+    grid = np.arange(run.motion.time[0], run.motion.time[-1], RESOLUTION)
+    if len(grid) < SHORTEST or not any(run.commands):
         return []
     time = run.motion.time[keep]
     measured = np.gradient(np.interp(grid, time, run.measured["piston/F"][keep]))
     expected = np.gradient(np.interp(grid, time, predict(run)[keep]))
     if not measured.std() or not expected.std():
         return []
-    far = min(int(limits.farthest / limits.resolution), len(grid) // 3)
+    far = min(int(FARTHEST / RESOLUTION), len(grid) // 3)
     from scipy.signal import correlate  # it takes half a second
 
     both = correlate(measured - measured.mean(), expected - expected.mean(), "same", "fft")
@@ -125,10 +117,10 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     place = int(np.argmax(near))
     if place in (0, 2 * far):  # the correlation still rises there: this is no lag
         return []
-    lag = (place - far) * limits.resolution
-    if abs(lag) <= limits.latest or near.max() < limits.alike:
+    lag = (place - far) * RESOLUTION
+    if abs(lag) <= LATEST or near.max() < ALIKE:
         return []
-    if near.max() < limits.more_alike * both[middle]:
+    if near.max() < MORE_ALIKE * both[middle]:
         return []
     word = "late" if lag > 0 else "early"
     return [
@@ -145,7 +137,3 @@ def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]
     edges = [-np.inf, *(e for pair in intervals for e in pair), np.inf]
     pairs = zip(edges[::2], edges[1::2], strict=True)
     return [(a, b) for a, b in pairs if b > a]
-
-
-def _flipped(motion: SmoothedMotion, stroke: float) -> SmoothedMotion:
-    return replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)

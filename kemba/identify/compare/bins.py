@@ -3,18 +3,34 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import chdtrc  # importing scipy.stats takes half a second
 
-from kemba.identify.evidence.windows import codes, rms
-from kemba.identify.problem.problem import Array, Labels, Rows, Texts
-from kemba.identify.tails import chi2_above, false_discoveries
+from kemba.identify.infer.windows import codes, rms
+from kemba.identify.problem.types import Array, Labels, Rows, Texts
+
+
+def false_discoveries(chances: Sequence[float] | Array) -> Array:
+    """Adjusted chances (n,): the expected share of false ones among those found up to each.
+
+    Source: Benjamini and Hochberg 1995.
+    """
+    p = np.asarray(chances, dtype=float)
+    order = np.argsort(p)
+    raised = p[order] * (len(p) / np.arange(1, len(p) + 1))
+    least = np.minimum.accumulate(raised[::-1])[::-1]
+    found = np.empty(len(p))
+    found[order] = np.clip(least, 0.0, 1.0)
+    return found
+
 
 ASSUMED = ("/foot/x", "/foot/z", "/stop")  # channels that no sensor measures
 STEADY = ("rest", "stance2")  # phases in which they can be relied on
+
 # phases of motion and open valves (extend, retract) in words, in the order in which they are shown
 PHASES = {
     "rest": "at rest",
@@ -99,7 +115,7 @@ def excess(z: Array) -> float:
     if len(z) > 1:
         z = np.delete(z, np.argmax(np.abs(z)))
     count = len(z) / correlation_length(z**2)
-    return chi2_above(np.mean(z**2) / BinSettings.tolerated**2 * count, count)
+    return float(chdtrc(count, np.mean(z**2) / BinSettings.tolerated**2 * count))
 
 
 def correlation_length(y: Array) -> float:

@@ -11,19 +11,24 @@ import numpy as np
 
 from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bins
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
-from kemba.identify.compare.hints import Hint, Response, conflicts, lacking, lagged
-from kemba.identify.compare.missing_force import Peak, peaks
-from kemba.identify.compare.tolerance import Tolerant, slopes, within_tolerance
+from kemba.identify.compare.hints import (
+    Hint,
+    Response,
+    Tolerant,
+    conflicts,
+    lacking,
+    lagged,
+    slopes,
+    within_tolerance,
+)
 from kemba.identify.compare.words import place_of
-from kemba.identify.evidence.windows import Windows, aggregation_windows, free_starts, rms
-from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
+from kemba.identify.infer.windows import Windows, aggregation_windows, free_starts, rms
+from kemba.identify.problem.missing_force import Peak, peaks
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, MissingForce, Rows, Texts, Theta
 from kemba.units import short
 
-
-class CompareSettings:
-    """How an error is spoken of that is too large for a good model."""
-
-    fair = 1.5  # error ratio below which it nearly explains them
+FAIR = 1.5  # error ratio below which it nearly explains them
 
 
 @dataclass(frozen=True)
@@ -135,13 +140,13 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tu
     if found.q_value < BinSettings.false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
-    fair = CompareSettings.fair
+    fair = FAIR
     bins = condition_bins(rows, region, window.first, sums)
     clean = not any(c.significant and c.ratio > fair for c in bins)
     return rms(sums), clean and rms(sums) <= BinSettings.tolerated
 
 
-def measured_units(rows: Rows) -> dict[str, str]:
+def _measured_units(rows: Rows) -> dict[str, str]:
     """Header of every measured channel: those with a place in a log."""
     units = {"x": "m", "z": "m", "q": "rad", "pitch": "rad", "F": "N", "P": "Pa"}
     found = {}
@@ -157,7 +162,7 @@ def _channels(
 ) -> Iterable[ChannelError]:
     errors = problem.window_errors(start)
     sums = window.sums(r)
-    headers = measured_units(rows)
+    headers = _measured_units(rows)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
         if channel not in headers or not own.any():
@@ -191,7 +196,7 @@ def phrase(found: Comparison) -> str:
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
             f"as is usual, and then it would be {short(found.tolerant_ratio)} times."
         )
-    grade = "nearly explains" if found.noise_ratio < CompareSettings.fair else "does not explain"
+    grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
     return "; ".join(parts) + "."

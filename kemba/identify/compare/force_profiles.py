@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array, Flags, ForceChannel, Problem
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Flags, ForceChannel
 from kemba.units import short
 
 
@@ -90,12 +91,12 @@ def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
 
 
 def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
-    by_value = [force_profile(channel, label, residual) for label in channel.quantities]
+    by_value = [_force_profile(channel, label, residual) for label in channel.quantities]
     return by_value + [_solved(channel, f"after {n} [ms]", 1e3 * middle(lags()), rise, residual)
                        for n, rise in channel.after.items()]  # fmt: skip
 
 
-def force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
+def _force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
     """The missing force of a channel by bins of the quantity `label`, fitted to `residual` (n,);
     None where the quantity hardly varies."""
     values = channel.quantities[label]

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import chdtrc, ndtr, ndtri
 
+from kemba.identify.compare.bins import false_discoveries
 from kemba.identify.compare.force_profiles import (
     ForceProfile,
     ForceProfileSettings,
@@ -15,20 +17,67 @@ from kemba.identify.compare.force_profiles import (
     middle,
     risen,
 )
-from kemba.identify.compare.tolerance import Slopes
 from kemba.identify.compare.words import command, quantity
-from kemba.identify.evidence.spike_slab import SpikeSlabSettings
-from kemba.identify.evidence.windows import codes
-from kemba.identify.problem.problem import Array, Changes, Labels, Problem, Rows
-from kemba.identify.tails import chi2_above, normal_at
+from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.windows import codes
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Candidate, Changes, Labels, Rows, Theta
 
 
-class HintSettings:
-    """When a hint is certain."""
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes of a residual.
 
-    certain = 1e-4  # p-value below which a hint is certain, over all that were tried
-    dependent = 1.5  # z scores are divided by this: rows are not quite independent
-    information = 4.0  # information on a parameter, per size squared, that a run must give
+    `by_lead` (n, leads): along the switch of every effect, per size. `by_nuisance` (n, nuisance):
+    along every nuisance parameter, per prior sigma.
+    """
+
+    leads: tuple[Candidate, ...]
+    by_lead: Array
+    by_nuisance: Array
+
+
+def slopes(problem: Problem, at: Theta) -> Slopes:
+    """Slopes at theta `at`, of all effects but sensor faults."""
+    leads = tuple(c for c in problem.candidates.values() if not c.sensor)
+    nuisance = list(problem.nuisance)
+    jacobian = problem.jacobian(at, [*(c.key for c in leads), *nuisance])
+    jacobian = jacobian * (
+        [c.lead.size for c in leads] + [problem.nuisance[n][1] for n in nuisance]
+    )
+    return Slopes(leads, jacobian[:, : len(leads)], jacobian[:, len(leads) :])
+
+
+@dataclass(frozen=True)
+class Tolerant:
+    """What is left when the model is as good as models are.
+
+    `left` (n,): the residual. `q_value`: of the figure or absent effect that is farthest off; it
+    controls false discoveries over all of them.
+    """
+
+    left: Array
+    q_value: float
+
+
+def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
+    """The likeliest explanation of a residual (n,) by a model that lacks nothing.
+
+    Each nuisance parameter is off by about its prior sigma, and each absent effect is there with a
+    small share of its size, as under every hypothesis of `discover`. The likeliest values, in units
+    of these sigmas, are then no larger than standard normal numbers are.
+    """
+    spike = SpikeSlabSettings.spike
+    columns = np.hstack([spike * known.by_lead, known.by_nuisance])
+    h = columns.T @ columns + np.eye(columns.shape[1])
+    off = -np.linalg.solve(h, columns.T @ residual)
+    q = false_discoveries(2.0 * ndtr(-np.abs(off))) if len(off) else np.ones(1)
+    return Tolerant(residual + columns @ off, float(q.min()))
+
+
+CERTAIN = 1e-4  # p-value below which a hint is certain, over all that were tried
+DEPENDENT = 1.5  # z scores are divided by this: rows are not quite independent
+INFORMATION = 4.0  # information on a parameter, per size squared, that a run must give
 
 
 @dataclass(frozen=True)
@@ -63,8 +112,8 @@ class Response:
 
     @property
     def certain(self) -> bool:
-        certain = HintSettings.certain
-        return bool(np.abs(self.z[self.peak]) > normal_at(certain / (2 * self.tests)))
+        certain = CERTAIN
+        return bool(np.abs(self.z[self.peak]) > -ndtri(certain / (2 * self.tests)))
 
     @property
     def hint(self) -> Hint:
@@ -102,7 +151,7 @@ def _strongest(
         if name in changes:
             own = rows.run == i
             rise[own] = risen(*changes[name], rows.time[own])
-    dependent = HintSettings.dependent
+    dependent = DEPENDENT
     best, tests = None, commands * len(rows.channels)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
@@ -134,7 +183,6 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
     same in all groups.
     """
-    settings = HintSettings
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -143,11 +191,11 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
     n = known.by_nuisance
     solve = np.linalg.inv(n.T @ n + np.eye(n.shape[1]))
     for i, c in enumerate(known.leads):
-        told = np.flatnonzero(power[:, i] > settings.information)
+        told = np.flatnonzero(power[:, i] > INFORMATION)
         own = cross[told, i]
         information = np.diag(power[told, i]) - own @ solve @ own.T
         p = _agreement(information, own @ solve @ (n.T @ r) - slope[told, i])
-        if p < settings.certain / len(known.leads):
+        if p < CERTAIN / len(known.leads):
             weight = float(-np.log10(max(p, 1e-300)))
             what = f"no one value of {c.key} fits {text}"
             yield Hint("conflict", f"{what}, so the model lacks something else", weight)
@@ -168,4 +216,4 @@ def _agreement(information: Array, pull: Array) -> float:
     certainty = np.linalg.inv(spread + imperfect**2 * np.eye(len(a)))
     ones = np.ones(len(a))
     apart = a - ones @ certainty @ a / (ones @ certainty @ ones)
-    return chi2_above(float(apart @ certainty @ apart), len(a) - 1)
+    return float(chdtrc(len(a) - 1, float(apart @ certainty @ apart)))

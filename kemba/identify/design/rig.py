@@ -1,27 +1,174 @@
-"""The designed test of a rig: valve edges and a motion of the rod that tell rivals apart."""
+"""The next test of a rig: a course of the rod and the valves that tells rivals apart, or a
+standard test where that is better."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from kemba.identify.design.confirm import evidence
-from kemba.identify.design.courses import beginnings, course
-from kemba.identify.design.menu import JudgedRig, judged_menu
-from kemba.identify.design.rivals import Rivals
-from kemba.identify.design.search import best_point
-from kemba.identify.design.separation import Separation, separation
-from kemba.identify.design.settings import (
+from kemba.config import dump_yaml
+from kemba.errors import KembaError
+from kemba.identify.answer import read_answer
+from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
-    RigCourseSettings,
+    Rivals,
+    Separation,
+    contenders,
+    evidence,
+    separation,
+    strength,
 )
-from kemba.identify.design.virtual import VirtualBench, as_predicted, log_time
-from kemba.identify.problem.problem import Array
+from kemba.identify.design.virtual import (
+    JudgedRig,
+    VirtualBench,
+    as_predicted,
+    judged_menu,
+    log_time,
+)
+from kemba.identify.problem.types import Array
 from kemba.model.model import Model
-from kemba.plant.rigs import Rig
+from kemba.model.spec import load_model
+from kemba.plant.rigs import CourseRig, Rig
+
+
+class RigCourseSettings:
+    """What a designed test of a rig may do."""
+
+    longest = 2.0  # longest log of a designed test [s]: short
+    # shortest log of a designed test [s]: chambers fill and vent three times, at the slowest rise
+    # time of Table I
+    shortest = 0.3
+    share = 0.5  # its log time as a share of that of the best standard test: half
+    places = 9  # places that the rod goes through
+    most_laps = 3  # most times that it goes through them
+    pulses = 3  # pulses of each valve
+    # shortest time between two switchings of a valve [s]: twice the dead time of the paper's valves
+    dwell = 0.02
+    fastest = 1.2  # highest speed of the rod [m.s-1]: that of the fastest standard test
+
+
+STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends at rest, by its mean
+
+
+def dimensions() -> int:
+    """Numbers that a course is made of: its places, twice the pulses of each valve, its laps."""
+    settings = RigCourseSettings
+    return settings.places + 4 * settings.pulses + 1
+
+
+def course(point: Array, duration: float, stroke: float) -> CourseRig:
+    """The course of a point (k,) of the unit cube, which lasts `duration` [s]."""
+    settings = RigCourseSettings
+    count, pulses = settings.places, settings.pulses
+    laps = 1 + min(int(point[-1] * settings.most_laps), settings.most_laps - 1)
+    every = duration / (laps * (count - 1))
+    first, second = np.split(point[count:-1], 2)
+    way = np.append(np.tile(point[: count - 1], laps), point[count - 1]) * stroke
+    places = _reachable(way, settings.fastest * every / STEEPEST)
+    return CourseRig(
+        name="designed",
+        places=tuple(round(float(x), 5) for x in places),
+        every=every,
+        extend=_spans(first, duration, pulses, settings.dwell),
+        retract=_spans(second, duration, pulses, settings.dwell),
+    )
+
+
+def _reachable(places: Array, reach: float) -> Array:
+    """Places (k,), each within `reach` of the one before."""
+    found = [float(places[0])]
+    for x in places[1:]:
+        found.append(float(np.clip(x, found[-1] - reach, found[-1] + reach)))
+    return np.array(found)
+
+
+def _spans(
+    weights: Array, duration: float, pulses: int, dwell: float
+) -> tuple[tuple[float, float], ...]:
+    """Spans in which a valve is on: `weights` (2 pulses,) share the time among breaks and pulses,
+    each of which lasts at least `dwell` [s] where the time suffices; the last break takes a mean
+    share."""
+    weights = np.append(weights, 0.5) + 1e-3
+    dwell = min(dwell, 0.5 * duration / len(weights))
+    parts = dwell + weights / weights.sum() * (duration - dwell * len(weights))
+    edges = np.round(np.cumsum(parts[:-1]), 4)
+    return tuple((float(edges[2 * i]), float(edges[2 * i + 1])) for i in range(pulses))
+
+
+def beginnings(count: int, seed: int) -> Array:
+    """Points (count, k) from which a search begins: plain courses, then points that fill the
+    cube evenly."""
+    from scipy.stats import qmc
+
+    settings = RigCourseSettings
+    plain = np.array(list(_plain(settings.places, settings.pulses)))
+    more = max(count - len(plain), 1)
+    even = qmc.Sobol(dimensions(), rng=seed).random_base2(int(np.ceil(np.log2(more))))
+    return np.asarray(np.vstack([plain, even])[:count])
+
+
+def _plain(places: int, pulses: int) -> Iterator[Array]:
+    """Courses that a person would think of: a rod at rest, one slow stroke, strokes to and fro;
+    each with the valves in turn, and
+    several times with both of them together."""
+    ways = [
+        np.full(places, 0.5),
+        np.linspace(0.05, 0.95, places),
+        0.5 - 0.45 * np.cos(np.arange(places) * np.pi / 2),
+    ]
+    early, late = np.tile([0.2, 0.5], pulses), np.tile([0.5, 0.2], pulses)
+    for way in ways:
+        yield np.concatenate([way, early, late, [0.0]])
+        yield np.concatenate([way, early, early, [1.0]])
+
+
+def _best_point(
+    worth: Callable[[Array], float],
+    begin: Array,
+    say: Callable[[str], None] = lambda text: None,
+    bounded: bool = True,
+) -> tuple[Array, int]:
+    """The point (k,) of the unit cube that is worth most, as far as a bounded search finds it, and
+    how many were tried.
+
+    `begin` (m, k): the first points that are tried. `bounded`: stop when the time is over; without
+    it the answer depends on nothing but the seed.
+    """
+    from scipy.optimize import differential_evolution
+
+    settings, started = DesignSearchSettings, time.monotonic()
+    seen: list[tuple[float, Array]] = []
+
+    def cost(point: Array) -> float:
+        over = bounded and time.monotonic() - started > settings.budget
+        if over and seen:
+            return 0.0
+        value = worth(np.asarray(point))
+        seen.append((value if np.isfinite(value) else 0.0, np.array(point)))
+        return -seen[-1][0]
+
+    def report(best: Array, convergence: float) -> bool:
+        top = max(value for value, _ in seen)
+        say(f"{len(seen)} tests tried; the best is worth {top:.2f}")
+        return bounded and time.monotonic() - started > settings.budget
+
+    differential_evolution(
+        cost,
+        [(0.0, 1.0)] * begin.shape[1],
+        init=np.clip(begin, 0.0, 1.0),
+        maxiter=settings.generations,
+        rng=np.random.default_rng(settings.seed),
+        polish=False,
+        tol=0.0,
+        callback=report,
+    )
+    return max(seen, key=lambda item: item[0])[1], len(seen)
 
 
 @dataclass(frozen=True)
@@ -39,6 +186,57 @@ class RigDesign:
         least, other = self.designed.evidence.least, self.standard.evidence.least
         return self.standard if least < min(clear, other) else self.designed
 
+    @property
+    def rig(self) -> Rig:
+        """What the test does."""
+        return self.chosen.rig
+
+    @property
+    def nats(self) -> float:
+        """Expected evidence [nats] between the two effects that are hardest to separate."""
+        return self.chosen.evidence.least
+
+    @property
+    def rivals(self) -> tuple[str, str]:
+        """These two effects."""
+        return self.chosen.evidence.first, self.chosen.evidence.nearest
+
+    @property
+    def sentence(self) -> str:
+        """What the test gains, in words."""
+        first, second = self.rivals
+        chosen, standard = self.chosen, self.standard
+        word, length = strength(self.nats), f"{chosen.log_s:.2g} s of log"
+        if self.nats < ExperimentSettings.clear:
+            return (
+                f"No test of a rig that was tried separates {first} from {second}: the best, "
+                f"'{chosen.rig.name}' ({length}), is expected to give {word} evidence."
+            )
+        text = (
+            f"The test '{chosen.rig.name}' ({length}) separates {first} from {second}: {word} "
+            "evidence is expected"
+        )
+        if chosen is standard:
+            return f"{text}; no shorter test that was tried gives as much."
+        other = f"the best standard test, '{standard.rig.name}' ({standard.log_s:.2g} s)"
+        if standard.evidence.least < 1.0:
+            return f"{text}; {other}, gives almost none."
+        return f"{text}, {chosen.pace / standard.pace:.2g} times as much per second as {other}."
+
+    def json(self) -> dict[str, Any]:
+        """The figures behind the sentence; `designed` and `standard` have the same keys."""
+        return {
+            "rig": self.rig.name,
+            "nats": self.nats,
+            "rivals": self.rivals,
+            "sentence": self.sentence,
+            "strength": strength(self.nats),
+            "log_s": self.chosen.log_s,
+            "designed": _figures(self.designed),
+            "standard": _figures(self.standard),
+            "tried": self.tried,
+        }
+
 
 def design_rig_test(
     model: Model,
@@ -51,10 +249,7 @@ def design_rig_test(
 
     None where a rig cannot show two of them.
     """
-    bench, settings = (
-        VirtualBench(model, ExperimentSettings.rows),
-        RigCourseSettings,
-    )
+    bench, settings = VirtualBench(model, ExperimentSettings.rows), RigCourseSettings
     coarse = VirtualBench(model, ExperimentSettings.coarse)
     say("judging the standard tests")
     standards = list(judged_menu(coarse, rivals))
@@ -70,11 +265,11 @@ def design_rig_test(
 
     search = DesignSearchSettings
     say(f"designing a test of {duration:.1f} s")
-    best = best_point(worth, beginnings(search.members, search.seed), say, bounded)
-    rig = course(best.point, duration, bench.stroke)
+    point, tried = _best_point(worth, beginnings(search.members, search.seed), say, bounded)
+    rig = course(point, duration, bench.stroke)
     say("fitting the rivals to what the tests would measure")
     before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
-    return RigDesign(before, after, best.tried)
+    return RigDesign(before, after, tried)
 
 
 def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
@@ -87,3 +282,35 @@ def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
     fitted = evidence(logs, rivals, nearest)
     nats = {**straight.nats, nearest: min(fitted, straight.least)}
     return JudgedRig(rig, Separation(first, nats), log_time(rig, bench.stroke))
+
+
+def propose(
+    folder: str | Path,
+    out: Path,
+    say: Callable[[str], None] = lambda text: None,
+    bounded: bool = True,
+) -> RigDesign:
+    """The test of a rig that best tells the possible effects of an answer apart, a YAML in `out`.
+
+    `bounded`: in about a minute. Raises KembaError where no test shows a difference, or a file
+    cannot be read or written.
+    """
+    answer = read_answer(folder)
+    rivals = contenders(answer)
+    model = load_model(str(answer.get("base") or "planning"), rig=True)
+    if model.mechanism.rig:
+        what = f"its model {model.name} is a rig of your own, of kind {model.mechanism.rig}"
+        hint = "tests are designed for a piston with valves and for the robot only"
+        raise KembaError(str(folder), what, hint=hint)
+    found = design_rig_test(model, rivals, say, bounded)
+    if found is None:
+        names = ", ".join(rivals.names)
+        raise KembaError(str(folder), f"no rig test shows a difference between {names}")
+    rig = {"kind": found.rig.kind, **found.rig.model_dump(mode="json", exclude_defaults=True)}  # type: ignore[attr-defined]
+    dump_yaml({"rig": {**rig, "notes": found.sentence}}, out)
+    return found
+
+
+def _figures(judged: JudgedRig) -> dict[str, Any]:
+    """Name of a test, and what it is expected to give."""
+    return {"rig": judged.rig.name, **judged.evidence.json(judged.log_s)}

@@ -1,26 +1,146 @@
-"""The designed motion of a robot: the safe sway that tells rivals apart best."""
+"""The next motion of a robot: the safe sway that tells the rivals of an answer apart best.
+
+The feet stand, the valves stay closed, the hips lean the body to and fro by a few centimetres, each
+lean faster or slower than the one before. A sway is known by its ways and times alone, so that it
+can be tried on the simulation before any plan is made; the task asks for the same ways at the same
+times, and planning finds the torques.
+"""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from kemba.config import dump_yaml
 from kemba.effects.mechanics.motor import Motor
 from kemba.errors import KembaError
-from kemba.identify.design.motions import Sway, controller
-from kemba.identify.design.rivals import Rivals
-from kemba.identify.design.separation import Separation, separation
-from kemba.identify.design.settings import DesignSearchSettings, SwaySettings
-from kemba.identify.problem.problem import Array
+from kemba.identify.answer import read_answer
+from kemba.identify.design.separation import (
+    DesignSearchSettings,
+    ExperimentSettings,
+    Rivals,
+    Separation,
+    contenders,
+    separation,
+    strength,
+)
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.model import Model
-from kemba.plant.controller import execute
+from kemba.model.spec import load_model
+from kemba.plant.controller import PERIOD, execute
 from kemba.plant.repeat import Sensors, take_log
 from kemba.trajectory import Trajectory
+
+
+class SwaySettings:
+    """What a robot may do in a designed motion."""
+
+    least = 0.03  # smallest lean of the hips [rad]
+    most = 0.25  # largest lean of the hips [rad]: 4 cm of the body
+    # largest acceleration of the body [m.s-2]: feet of the shipped robot slip at about 10
+    acceleration = 8.0
+    leans = 6  # most leans
+    shortest = 0.5  # shortest sway [s]
+    longest = 0.9  # longest sway [s]: plans of up to so long replay without feedback
+    pace = 1.5  # most by which a lean is longer than the one before
+    hold = 0.3  # rest before the motion [s]: as the shipped tasks
+    nodes = 50  # nodes of the task per second: steps of 20 ms
+    fewest = 30  # fewest nodes of the task
+    knee = 0.02  # least height of the knees [m]: as the hop
+    slip = 2e-3  # way of a foot that counts as slipping [m]: boom noise, 6 sigma
+    load = 0.15  # least load of a foot, as a share of half the weight: margin
+    effort = 0.8  # largest torque of a hip, as a share of its peak: margin
+    tried = 12  # motions that are tried: a minute
+    least_tried = 6  # motions that are tried on the slowest machine
+    rows = 500.0  # rows per second of the simulated logs [Hz]
+
+
+@dataclass(frozen=True)
+class Sway:
+    """Leans of the hips by `angle` [rad] to either side in turn, `leans` of them in `duration` [s].
+
+    `pace`: how much longer each lean lasts than the one before; below 1 they become faster.
+    """
+
+    angle: float
+    leans: int
+    duration: float
+    pace: float
+
+    @property
+    def ends(self) -> Array:
+        """Times (leans + 1,) [s] at which the leans, and the way back, end."""
+        parts = self.pace ** np.arange(self.leans + 1)
+        parts[0] *= 0.7  # half the way of the others,
+        parts[-1] *= 0.7  # at the same acceleration
+        return np.asarray(self.duration * np.cumsum(parts) / parts.sum())
+
+    def lean(self, times: Array) -> tuple[Array, Array]:
+        """Angle [rad] and rate [rad.s-1] (m,) at `times` (m,) [s]; at rest at every turn."""
+        knots = np.concatenate([[0.0], self.ends])
+        ways = self.angle * np.array([0.0, *(1.0 - 2.0 * (i % 2) for i in range(self.leans)), 0.0])
+        piece = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, self.leans)
+        length = np.diff(knots)[piece]
+        s = np.clip((times - knots[piece]) / length, 0.0, 1.0)
+        way = np.diff(ways)[piece]
+        angle = ways[piece] + way * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        return angle, way * 30.0 * s**2 * (1.0 - s) ** 2 / length
+
+
+def controller(model: Model, sway: Sway) -> Trajectory:
+    """The controller's table that sways a robot from its standing pose by its hip gains alone."""
+    settle = SwaySettings.hold
+    times = np.arange(round((settle + sway.duration) / PERIOD) + 1) * PERIOD - settle
+    angle, rate = sway.lean(np.clip(times, 0.0, None))
+    columns: dict[str, Array] = {}
+    for leg in model.mechanism.legs:
+        pose = model.mechanism.standing[f"{leg}/hip/q"]
+        columns[f"{leg}/hip/q [rad]"], columns[f"{leg}/hip/w [rad.s-1]"] = pose + angle, rate
+        columns[f"{leg}/hip/tau [N.m]"] = np.zeros(len(times))
+        for valve in ("extend", "retract"):
+            columns[f"{leg}/valve/{valve} [1]"] = np.zeros(len(times))
+    return Trajectory(times, columns, {"kind": "controller", "lead": settle})
+
+
+def task(model: Model, name: str, sway: Sway, done: Trajectory, notes: str) -> dict[str, Any]:
+    """The task of a sway that was simulated as `done`: the same ways at the same times."""
+    settings = SwaySettings
+    nodes = max(round(settings.nodes * sway.duration), settings.fewest)
+    leg = next(iter(model.mechanism.legs))
+    still = {"rest": True, "body/x": "0 m", "body/pitch": "0 deg", "*/foot/z": "0 m"}
+    hip = float(model.mechanism.standing[f"{leg}/hip/q"])
+    goals = {}
+    for i, end in enumerate(sway.ends[:-1]):
+        way = float(np.interp(end, done.time, done["body/x"]))
+        at = float(round(end / sway.duration * nodes) / nodes)
+        goals[f"lean_{i + 1}"] = {"quantity": "body/x", "at": at, "equals": f"{1e3 * way:.1f} mm"}
+    pose = {"*/piston/x": "0 m", f"{leg}/hip/q": f"{hip:.4f} rad", "settled": True}
+    return {
+        "name": "sway",
+        "notes": notes,
+        "model": name,
+        "duration": f"{sway.duration:.3f} s",
+        "nodes": nodes,
+        "hold": f"{settings.hold:g} s",
+        "start": {**still, **pose},
+        "end": still,
+        "bounds": {
+            "*/foot/z": {"at_most": "0 m"},
+            "*/piston/x": {"at_most": "0 m"},
+            "*/valve/*": {"at_most": 0},
+            "*/knee/z": {"at_least": f"{1e3 * settings.knee:g} mm"},
+        },
+        "goals": goals,
+        "cost": {"torque_squared": 1},
+    }
+
 
 # a slow lean to both sides: what one would do without a design
 STANDARD = Sway(angle=0.1, leans=2, duration=0.9, pace=1.0)
@@ -54,7 +174,7 @@ class RobotDesign:
     tried: int
 
 
-def design_motion(
+def _design_motion(
     model: Model,
     rivals: Rivals,
     say: Callable[[str], None] = lambda text: None,
@@ -76,7 +196,7 @@ def design_motion(
         if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
             break
         count += 1
-        tried = try_out(model, sway, rivals)
+        tried = _try_out(model, sway, rivals)
         if tried is None:
             continue
         if tried.evidence.first == "":
@@ -90,7 +210,7 @@ def design_motion(
     return RobotDesign(standard, tuple(found), count)
 
 
-def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
+def _try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
     """A sway on the simulation; None where it is not safe."""
     settings = SwaySettings
     try:
@@ -110,7 +230,7 @@ def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
     return found if found is not None else Separation("", {})
 
 
-def expected_of_run(run: str | Path, model: Model, rivals: Rivals) -> Separation:
+def _expected_of_run(run: str | Path, model: Model, rivals: Rivals) -> Separation:
     """The same of a run folder's plan."""
     done = execute(run, model, sample=1.0 / SwaySettings.rows).trajectory
     return expected(model, done, rivals)
@@ -175,3 +295,104 @@ def _point(sway: Sway) -> Array:
             0.5 + 0.5 * np.log(sway.pace) / np.log(s.pace),
         ]
     )
+
+
+@dataclass(frozen=True)
+class MotionProposal:
+    """Safe motions, the best one first, and the evidence that is expected of each."""
+
+    model: Model
+    base: str
+    rivals: Rivals
+    design: RobotDesign
+
+    @property
+    def best(self) -> Tried:
+        """The motion with the most expected evidence."""
+        return self.design.best[0]
+
+    @property
+    def nats(self) -> float:
+        """Expected evidence [nats] of one run of it, between the effects hardest to separate."""
+        return self.best.evidence.least
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """These two effects."""
+        return self.best.evidence.first, self.best.evidence.nearest
+
+    @property
+    def repeats(self) -> int | None:
+        """Runs until the evidence is decisive; None where that would be too many."""
+        count = math.ceil(ExperimentSettings.clear / max(self.nats, 1e-9))
+        return count if count <= ExperimentSettings.repeats else None
+
+    @property
+    def sentence(self) -> str:
+        """What the motion gains, in words."""
+        first, second = self.pair
+        best, standard = self.best, self.design.standard
+        what = f"A sway of {best.sway.duration:.2g} s with {best.sway.leans} leans"
+        gives = f"{strength(self.nats)} evidence between {first} and {second}"
+        if self.repeats is None:
+            return (
+                f"{what} is the best of {self.design.tried} safe motions, and is expected to give "
+                f"{gives}: feet that stand and pistons at rest do not tell these two apart. Try "
+                "the rig (--on rig), or a jump."
+            )
+        again = "" if self.repeats == 1 else f" in one run, and decisive in {self.repeats}"
+        text = f"{what} is expected to give {gives}{again}"
+        if best is standard:
+            return f"{text}; no other motion that was tried gives more."
+        ratio = best.pace / max(standard.pace, 1e-9)
+        return f"{text}, {ratio:.2g} times as much per second as a slow lean to both sides."
+
+    def json(self) -> dict[str, Any]:
+        """The figures behind the sentence; `designed` and `standard` have the same keys."""
+        standard = self.design.standard
+        return {
+            "motion": "sway",
+            "nats": self.nats,
+            "rivals": self.pair,
+            "sentence": self.sentence,
+            "strength": strength(self.nats),
+            "log_s": self.best.log_s,
+            "repeats": self.repeats,
+            "designed": self.best.evidence.json(self.best.log_s),
+            "standard": standard.evidence.json(standard.log_s),
+            "tried": self.design.tried,
+        }
+
+    def write(self, out: Path, tried: Tried) -> None:
+        """One of the motions as a task YAML. Raises KembaError."""
+        notes = self.sentence if tried is self.best else "the next best motion"
+        dump_yaml(task(self.model, self.base, tried.sway, tried.done, notes), out)
+
+    def nats_of(self, run: str | Path) -> float:
+        """Expected evidence [nats] of the plan in a run folder."""
+        return _expected_of_run(run, self.model, self.rivals).least
+
+
+def propose_motion(
+    folder: str | Path,
+    out: Path,
+    say: Callable[[str], None] = lambda text: None,
+    bounded: bool = True,
+) -> MotionProposal:
+    """The safe motion that best tells the possible effects of an answer apart, a task in `out`.
+
+    `bounded`: in about a minute. Raises KembaError where no motion shows a difference, or a file
+    cannot be read or written.
+    """
+    answer = read_answer(folder)
+    rivals, base = contenders(answer), str(answer.get("base") or "planning")
+    model = load_model(base)
+    if model.mechanism.rig or not model.mechanism.robot:
+        raise KembaError(str(folder), f"its model {model.name} is no robot")
+    design = _design_motion(model, rivals, say, bounded)
+    if design is None:
+        names = ", ".join(rivals.names)
+        raise KembaError(str(folder), f"no log of the robot shows a difference between {names}")
+    found = MotionProposal(model, base, rivals, design)
+    found.write(out, found.best)
+    return found

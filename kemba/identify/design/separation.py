@@ -1,4 +1,4 @@
-"""How much evidence logs are expected to hold between two effects.
+"""Which effects an answer leaves in doubt, and how much evidence logs would hold between them.
 
 If A is there and B is fitted, the fit of B stays away from the prediction of A. Half the squared
 distance that is left, in units of the noise, is the expected logarithm of the Bayes factor. All
@@ -15,10 +15,89 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.design.rivals import Rivals
-from kemba.identify.design.settings import ExperimentSettings, SeparationSettings
-from kemba.identify.evidence.linear import LinearSettings, is_shape, priors, within
-from kemba.identify.problem.problem import Array, Problem, Theta
+from kemba.identify.infer.linear import LinearSettings, is_shape, priors, within
+from kemba.identify.infer.refit import Frozen, refit
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Theta
+
+
+class ExperimentSettings:
+    """The sensors of a rig, and when a question is settled."""
+
+    force_noise = 1.0  # noise of the force sensor [N]: a usual transducer of a rig
+    position_noise = 1e-5  # noise of the position sensor [m]: a usual one of a rig
+    # force that not even a good model explains [N]: half the noise of the sensor; without it slow
+    # errors would be averaged away
+    unexplained = 0.5
+    memory = 0.03  # time in which that force changes [s]: that of the fastest rise times
+    sample = 20000  # rows of noise from which its colour is learnt
+    rows = 1000.0  # rows per second of the simulated logs [Hz]
+    coarse = 500.0  # the same while the best test is looked for [Hz]
+    tests = 12  # most tests of one rig that are simulated to judge it
+    # evidence that settles a question [nats]: Kass and Raftery 1995, 'very strong' evidence begins
+    # at 5 nats
+    clear = 5.0
+    repeats = 10  # most runs of one motion: an afternoon
+    rivals = 4  # effects that are to be told apart: few
+
+
+STEPS = 3  # steps of the fit of a rival
+
+
+class DesignSearchSettings:
+    """The search for the best test: differential evolution."""
+
+    members = 16  # tests of each generation
+    generations = 3  # generations after the first
+    seed = 1  # seed of the search: the same answer every time
+    budget = 60.0  # time after which no new test is tried [s]: a user waits one minute
+
+
+Values = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """Effects of which one is there: name -> its parameters, the likeliest first.
+
+    `shared`: parameters of the effects that are there whichever of them it is.
+    """
+
+    effects: Mapping[str, Values]
+    shared: Mapping[str, float]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The rivals, the likeliest first."""
+        return tuple(self.effects)
+
+    def theta(self, name: str) -> Values:
+        """Everything that is there if it is this one."""
+        return {**self.shared, **self.effects[name]}
+
+
+def contenders(answer: Mapping[str, Any]) -> Rivals:
+    """The effect of an answer that is least sure to be that one, and what else it could be.
+
+    That is the first one that has equivalents, else the first one. Effects that the answer holds
+    beside it are taken to be there. Raises KembaError where the answer ranks no effect.
+    """
+    rows = {row["effect"]: row for row in answer["ranking"]}
+    if not rows:
+        raise KembaError("answer.json", "has no ranking", "nothing is left to be separated")
+    doubtful = [name for name, row in rows.items() if row["equivalent_to"]]
+    first = [*doubtful, *rows][0]
+    beside = set(answer.get("added", ())) - {first}
+    likely = [name for name in rows if name not in beside]
+    order = dict.fromkeys([first, *rows[first]["equivalent_to"], *likely])
+    chosen = [name for name in order if name in rows][: ExperimentSettings.rivals]
+    shared = {k: v for e in beside - set(chosen) if e in rows for k, v in _values(rows[e]).items()}
+    return Rivals({name: _values(rows[name]) for name in chosen}, shared)
+
+
+def _values(row: Mapping[str, Any]) -> Values:
+    """Parameters of a row of the ranking, by their names in theta."""
+    return {f"{row['effect']}.{p}": v["value"] for p, v in row["parameters"].items()}
 
 
 @dataclass(frozen=True)
@@ -96,7 +175,7 @@ class _Side:
         least = 0.5 * float(gap @ gap)
         figures = np.array([name in self.problem.nuisance for name in self.names])
         far = np.where(figures, LinearSettings.widths, np.inf)
-        for _ in range(SeparationSettings.steps):
+        for _ in range(STEPS):
             z = np.clip(z - np.linalg.solve(h, self.columns.T @ gap + z), -far, far)
             try:
                 gap = self.problem.residual(self._moved(z)) - truth
@@ -136,3 +215,31 @@ def _widths(problem: Problem, theta: Theta, names: tuple[str, ...]) -> Array:
             for name, w in zip(names, width, strict=True)
         ]
     )
+
+
+def best_fit(problem: Problem, rivals: Rivals, name: str) -> dict[str, float]:
+    """The best theta of logs if this rival is there, with the effects that all rivals share."""
+    theta, names = rivals.theta(name), tuple(problem.nuisance)
+    shared = (key.rsplit(".", 1)[0] for key in rivals.shared)
+    frozen = Frozen(names, problem.jacobian(theta, names))
+    return refit(problem, tuple(sorted({name, *shared})), theta, frozen).theta
+
+
+def evidence(problem: Problem, rivals: Rivals, rival: str) -> float:
+    """How much worse [nats] the best fit of a rival explains logs without noise than what made
+    them, which explains them entirely."""
+    return misfit(problem, best_fit(problem, rivals, rival))
+
+
+def misfit(problem: Problem, theta: Theta) -> float:
+    """Half the sum of squares of residuals, and of how far nominal figures are from their values,
+    in sigmas."""
+    r = problem.residual(theta)
+    away = [(theta.get(n, m) - m) / s for n, (m, s) in problem.nuisance.items()]
+    return 0.5 * float(r @ r + np.sum(np.square(away)))
+
+
+def strength(nats: float) -> str:
+    """Evidence in words after Kass and Raftery 1995: 1, 3 and 5 nats are their steps."""
+    steps = {5.0: "decisive", 3.0: "strong", 1.0: "weak"}
+    return next((word for least, word in steps.items() if nats >= least), "almost no")

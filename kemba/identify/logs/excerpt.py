@@ -8,16 +8,12 @@ import numpy as np
 
 from kemba.trajectory import Array, Trajectory
 
-
-class ExcerptSettings:
-    """How much of long logs is used."""
-
-    rows = 60_000  # largest number of rows of all logs together: one minute at 1 kHz
-    piece = 2.0  # length of the pieces that are kept of a long log [s]
-    finest = 7e-4  # rows closer than this are thinned [s]: below it, two rows fit into 1 ms
-    # distance of rows after thinning [s]: an eighth of the fastest rise time of a chamber (8 ms,
-    # Table I)
-    step = 1e-3
+ROWS = 60_000  # largest number of rows of all logs together: one minute at 1 kHz
+PIECE = 2.0  # length of the pieces that are kept of a long log [s]
+FINEST = 7e-4  # rows closer than this are thinned [s]: below it, two rows fit into 1 ms
+# distance of rows after thinning [s]: an eighth of the fastest rise time of a chamber (8 ms,
+# Table I)
+STEP = 1e-3
 
 
 def excerpts(
@@ -27,8 +23,7 @@ def excerpts(
 
     `rows`: largest number of rows of all logs together; the setting where it is not given.
     """
-    settings = ExcerptSettings
-    rows = settings.rows if rows is None else rows
+    rows = ROWS if rows is None else rows
     found, remarks = [], []
     for log in logs:
         thin = thinned(log)
@@ -41,17 +36,15 @@ def excerpts(
     share = rows / total
     pieces = [piece for log in found for piece in cut(log, share)]
     remarks.append(
-        f"{total} rows are more than a search needs: "
-        f"{len(pieces)} pieces of {settings.piece:g} s are used"
+        f"{total} rows are more than a search needs: {len(pieces)} pieces of {PIECE:g} s are used"
     )
     return pieces, remarks
 
 
 def thinned(log: Trajectory) -> Trajectory:
     """One row per millisecond, and every row in which a valve switches."""
-    settings = ExcerptSettings
     step = float(np.median(np.diff(log.time)))
-    group = round(settings.step / step) if step < settings.finest else 1
+    group = round(STEP / step) if step < FINEST else 1
     if group < 2:
         return log
     chosen = np.arange(len(log)) % group == 0
@@ -65,7 +58,7 @@ def thinned(log: Trajectory) -> Trajectory:
 def cut(log: Trajectory, share: float) -> list[Trajectory]:
     """Pieces spread evenly over the log that make up `share` of it."""
     span = float(log.time[-1] - log.time[0])
-    piece = ExcerptSettings.piece
+    piece = PIECE
     wanted = max(1, int(span * share / piece))
     if span <= 2 * piece:
         return [log]

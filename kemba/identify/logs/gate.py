@@ -8,14 +8,37 @@ import numpy as np
 
 from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
-from kemba.identify.logs.fault import UNMAPPED
-from kemba.identify.logs.fault import log_fault as _fault
-from kemba.identify.logs.own_rigs import own_faults
-from kemba.identify.logs.reading import OWN_RIGS, legs_of, needed
-from kemba.identify.logs.settings import GateSettings, range_of
+from kemba.identify.logs.reading import OWN_RIGS, GateSettings, legs_of, needed, range_of
 from kemba.identify.problem.noise import difference_sigma
 from kemba.logs.times import rate_missing
 from kemba.trajectory import TIME, Array, Trajectory
+
+UNMAPPED = "of a log of another program, give its source in the column map (--map)"
+
+
+def _log_fault(
+    log: Trajectory,
+    what: str,
+    expected: str = "",
+    hint: str = "",
+    row: int | None = None,
+    column: str = "",
+) -> KembaError:
+    """What is wrong with a log, at its place; `row` counts from 0."""
+    where = log.meta.get("path", log.meta.get("name", "log"))
+    if row is not None:
+        names = ["time", *log.names]
+        bare = column.split(" [")[0]
+        at = names.index(bare) + 1 if bare in names else 1
+        where = f"{where}:{row + 2}:{at}"
+    return KembaError(f"{where}: {column}" if column else where, what, expected, hint)
+
+
+FEWEST = 60  # rows that the log of a moving rig needs
+FEWEST_STILL = 8  # readings per channel that a vessel's log needs
+MISSING = 0.3  # share of readings of a needed column that may be missing
+VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
+UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
 class BadData(ConfigErrors):
@@ -33,7 +56,7 @@ def check_logs(logs: Sequence[Trajectory]) -> list[str]:
 def _faults(log: Trajectory) -> list[KembaError]:
     """Faults of one log; a later check runs only where the earlier ones found nothing."""
     if log.meta["kind"] in OWN_RIGS:
-        return own_faults(log)
+        return _own_faults(log)
     for stage in (_columns, _time, _cells, _values):
         found = list(stage(log))
         if found:
@@ -45,13 +68,13 @@ def _columns(log: Trajectory) -> Iterator[KembaError]:
     for name in needed(log):
         if name not in log:
             hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
-            yield _fault(log, f"needs the column '{name}', which is missing", hint=hint)
+            yield _log_fault(log, f"needs the column '{name}', which is missing", hint=hint)
     for name in log.names:
         unit = _unit_of(name)
         if unit is not None and log.unit(name) != unit:
             what = f"the column's unit is [{log.unit(name)}]"
             expected, hint = f"'{name} [{unit}]' was expected", "convert it with --map"
-            yield _fault(log, what, expected, hint, column=name)
+            yield _log_fault(log, what, expected, hint, column=name)
 
 
 def _unit_of(name: str) -> str | None:
@@ -61,10 +84,11 @@ def _unit_of(name: str) -> str | None:
     return CHANNELS[name.split("/")[-1]][0] if range_of(name) else None
 
 
-def _time(log: Trajectory) -> Iterator[KembaError]:
-    t, limits = log.time, GateSettings
-    if len(t) < limits.fewest:
-        yield _fault(log, f"has {len(t)} rows", f"at least {limits.fewest} were expected")
+def _clock(log: Trajectory, fewest: int) -> Iterator[KembaError]:
+    """Enough rows, and times that increase from one to the next."""
+    t = log.time
+    if len(t) < fewest:
+        yield _log_fault(log, f"has {len(t)} rows", f"at least {fewest} were expected")
         return
     wrong = ~np.isfinite(t)
     wrong[1:] |= ~(np.diff(t) > 0)
@@ -75,20 +99,28 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
             same = "is repeated" if i and t[i] == t[i - 1] else "goes back"
             what = f"the time {same}: {t[i]:.6f} s after {t[i - 1]:.6f} s"
         count = f"{int(wrong.sum())} such rows; are rows duplicated, or clocks mixed?"
-        yield _fault(log, what, "times must increase from row to row", count, row=i, column=TIME)
+        expected = "times must increase from row to row"
+        yield _log_fault(log, what, expected, count, row=i, column=TIME)
+
+
+def _time(log: Trajectory) -> Iterator[KembaError]:
+    t, limits = log.time, GateSettings
+    faults = list(_clock(log, limits.fewest))
+    if faults:
+        yield from faults
         return
     span = t[-1] - t[0]
     if span < limits.shortest:
         expected = f"at least {limits.shortest} s were expected"
-        yield _fault(log, f"lasts {span:.3f} s", expected)
+        yield _log_fault(log, f"lasts {span:.3f} s", expected)
     step = float(np.median(np.diff(t)))
     if step > limits.slowest:
         in_ms = step > limits.milliseconds
         hint = "is the time in milliseconds?" if in_ms else "a chamber fills within 8 ms"
         expected = f"at least {1.0 / limits.slowest:.0f} rows a second"
-        yield _fault(log, f"has a row every {step:.3g} s", expected, hint)
+        yield _log_fault(log, f"has a row every {step:.3g} s", expected, hint)
     elif span > limits.gaps * len(t):
-        yield _fault(log, "has gaps longer than all of its rows", column=TIME)
+        yield _log_fault(log, "has gaps longer than all of its rows", column=TIME)
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
@@ -99,10 +131,10 @@ def _cells(log: Trajectory) -> Iterator[KembaError]:
         step, share = rate_missing(log.time, y)
         if share > limits.missing:
             what = f"{100 * share:.0f} % of its readings are missing"
-            yield _fault(log, what, column=name, row=int(np.argmax(missing)))
+            yield _log_fault(log, what, column=name, row=int(np.argmax(missing)))
         elif step > limits.slowest:
             expected = f"at least {1.0 / limits.slowest:.0f} readings a second"
-            yield _fault(log, f"has a reading every {step:.3g} s", expected, column=name)
+            yield _log_fault(log, f"has a reading every {step:.3g} s", expected, column=name)
         elif "valve/" in name:
             yield from _valve(log, name, y)
 
@@ -115,7 +147,7 @@ def _valve(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         what = f"the valve command is {y[i]:g}"
         hint = "map a voltage or per cent with a scale" if y[i] > 1 else ""
         expected = f"0 or 1 within {far:g} was expected"
-        yield _fault(log, what, expected, hint, row=i, column=name)
+        yield _log_fault(log, what, expected, hint, row=i, column=name)
 
 
 def _values(log: Trajectory) -> Iterator[KembaError]:
@@ -146,7 +178,7 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     if outside.mean() > few:
         i = int(np.argmax(outside))
         what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
-        yield _fault(
+        yield _log_fault(
             log,
             what,
             f"{expected.split(';')[0]} expected",
@@ -174,7 +206,7 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     at_end = value in (values.max(), values.min())
     what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
     hint = "is the sensor saturated?" if at_end else "is the sensor stuck?"
-    yield _fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
+    yield _log_fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
 
 
 def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
@@ -189,7 +221,7 @@ def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         i = int(np.argmax(far))
         what = f"leaps by {1e3 * step[i]:.1f} mm within {1e3 * passed[i]:.1f} ms"
         hint = "are two logs joined?"
-        yield _fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
+        yield _log_fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
 
 
 def _longest(flags: np.ndarray) -> tuple[int, int]:
@@ -211,16 +243,16 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
     moving = [n for n in needed(log) if n.endswith("/x") or n == "body/z"]
     moved = any(_travel(log[n]) > limits.moves for n in moving)
     if not switched and not moved:
-        yield _fault(
+        yield _log_fault(
             log, "no valve switches and nothing moves", "a log with excitation was expected"
         )
         return
     if log.meta["kind"] == "bench" and _travel(log["piston/F"]) == 0.0:
-        yield _fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
+        yield _log_fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
     for leg in legs_of(log) if log.meta["kind"] == "robot" else ():
         for name in (f"{leg}/hip/q", f"{leg}/piston/x", "body/z"):
             if np.ptp(log[name][np.isfinite(log[name])]) == 0.0 and len(log) > limits.dead:
-                yield _fault(log, "never changes", "is the sensor dead?", column=name, row=0)
+                yield _log_fault(log, "never changes", "is the sensor dead?", column=name, row=0)
 
 
 def _travel(y: Array) -> float:
@@ -246,3 +278,67 @@ def sentence(faults: Iterable[KembaError]) -> str:
     faults = list(faults)
     more = f" (and {len(faults) - 3} more)" if len(faults) > 3 else ""
     return "The data cannot be right: " + " | ".join(str(f) for f in faults[:3]) + more
+
+
+def _own_faults(log: Trajectory) -> list[KembaError]:
+    """Faults of the log of a rig; a later check runs only where the earlier ones found nothing."""
+    for stage in (_rig_columns, _rig_time, _rig_readings, _rig_excitation):
+        found = list(stage(log))
+        if found:
+            return found
+    return []
+
+
+def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
+    """Columns that the rig's model asks for; of a vessel, pressure or temperature will do."""
+    logged: dict[str, str] = log.meta.get("logged", {})
+    known = [name for name in logged if name in log]
+    enough = log.meta["kind"] == "vessel" and bool(known)
+    for name, unit in logged.items():
+        if name not in log:
+            if enough:
+                continue
+            hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
+            what = f"needs the column '{name} [{unit}]', which is missing"
+            yield _log_fault(log, what, "the model's rig asks for it", hint)
+        elif log.unit(name) != unit:
+            what = f"the column's unit is [{log.unit(name)}]"
+            hint = "convert it with --map; is the axis of the rig linear or rotary?"
+            yield _log_fault(log, what, f"'{name} [{unit}]' was expected", hint, column=name)
+
+
+def _rig_time(log: Trajectory) -> Iterator[KembaError]:
+    vessel = log.meta["kind"] == "vessel"
+    yield from _clock(log, FEWEST_STILL if vessel else FEWEST)
+
+
+def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
+    vessel = log.meta["kind"] == "vessel"
+    for name in log.meta.get("logged", {}):
+        if name not in log:
+            continue
+        y = log[name]
+        good = np.isfinite(y)
+        if vessel and good.sum() < FEWEST_STILL:
+            what = f"has {int(good.sum())} readings"
+            yield _log_fault(log, what, f"at least {FEWEST_STILL} were expected", column=name)
+        elif not vessel and 1.0 - good.mean() > MISSING:
+            what = f"{100 * (1.0 - good.mean()):.0f} % of its readings are missing"
+            yield _log_fault(log, what, column=name, row=int(np.argmin(good)))
+        elif name.endswith("/P") and np.median(y[good]) < VACUUM:
+            what = f"reads {np.median(y[good]):.4g} Pa, less than any air pressure"
+            hint = "is it in bar or kPa, or above the atmosphere? Convert it with --map"
+            yield _log_fault(log, what, "pascals, absolute, were expected", hint, column=name)
+
+
+def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
+    for name in log.meta.get("logged", {}):
+        if name not in log:
+            continue
+        y = log[name][np.isfinite(log[name])]
+        steps = np.diff(np.unique(y))
+        if not len(steps):
+            hint = "is the sensor dead, or the rig at rest?"
+            yield _log_fault(log, "never changes", "a log of a rig that works", hint, 0, name)
+        elif name.endswith(("/x", "/q")) and np.ptp(y) < UNMOVED * (steps.min()):
+            yield _log_fault(log, "hardly moves", "a log with motion was expected", column=name)

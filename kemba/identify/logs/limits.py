@@ -7,8 +7,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.problem.quantisation import is_coarse, step_of
+from kemba.identify.problem.noise import difference_sigma, is_coarse, step_of
 from kemba.trajectory import Trajectory
 
 

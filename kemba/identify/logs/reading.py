@@ -2,20 +2,136 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from kemba.errors import KembaError, map_hint
-from kemba.identify.logs.settings import GateSettings, range_of
-from kemba.identify.logs.sidecar import check_kind, check_noise
+from kemba.errors import KembaError, map_hint, suggest
 from kemba.logs import ColumnMap, open_log
 from kemba.logs.foreign import unwrapped, wraps
 from kemba.logs.times import one_clock
 from kemba.mechanism import Mechanism
+from kemba.quantity import Quantity, convert, to_si
 from kemba.trajectory import Array, Trajectory, sidecar
+
+
+class GateSettings:
+    """When a log is refused."""
+
+    shortest = 0.15  # a log must last at least so long [s]
+    fewest = 60  # a log must have at least so many rows
+    # largest median distance of rows [s]: 50 rows a second; chambers of Table I need 8 to 37 ms to
+    # fill
+    slowest = 0.02
+    # median distance of rows that suggests a time in ms [s]: nobody logs at 2 Hz, 1 kHz is usual
+    milliseconds = 0.5
+    gaps = 0.5  # mean distance of rows that means long gaps [s]
+    missing = 0.3  # share of readings of a needed column that may be missing
+    impossible = 0.002  # share of impossible readings that a needed column may have
+    impossible_elsewhere = 0.05  # the same for columns that are not needed
+    # a valve column may be off 0 or 1 by this: a scaled voltage is off by a few per mille to a few
+    # per cent
+    valve = 0.02
+    # readings beyond this, in the channel's SI unit, count as missing: a broken record, not a
+    # measured value; its square would overflow
+    absurd = 1e12
+    quiet = 1e-4  # noise over range below which a channel counts as noiseless
+    frozen = 40  # equal readings in a row that mean a dead sensor
+    repeats = 0.2  # share of equal neighbours elsewhere that means a coarse sensor
+    fastest = 8.0  # no piston moves faster [m.s-1]
+    leap = 0.004  # a position may be off by this between two rows [m]
+    calm = 0.3  # a leap stands beside steps of less than this share of the largest
+    moves = 2e-3  # a position with less travel does not move [m]
+    beyond = 0.015  # a position may read so far past the stroke [m]
+    dead = 200  # rows without any change that mean a dead sensor
+
+
+# Physical limits by the last part of the name: smallest, largest, and the likely mistake.
+RANGES = {
+    "piston/x": (-0.01, 1.0, "metres from 0 (retracted) to the stroke; is it in millimetres?"),
+    "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
+    "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
+    "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
+    "hip/tau": (-60.0, 60.0, "newton metres at the joint; is it in N.mm?"),
+    "body/pitch": (-math.pi, math.pi, "radians, nose up positive; is it in degrees?"),
+    "body/x": (-20.0, 20.0, "metres; is it in millimetres?"),
+    "body/z": (-0.1, 3.0, "metres above the ground; is it in millimetres?"),
+    "body/vx": (-20.0, 20.0, "metres per second"),
+    "body/vz": (-20.0, 20.0, "metres per second"),
+    "body/ax": (-2000.0, 2000.0, "metres per second squared"),
+    "body/az": (-2000.0, 2000.0, "metres per second squared"),
+    "P": (2e4, 2e6, "pascals, absolute; is it in bar or kPa, or gauge?"),
+}
+
+
+def range_of(name: str) -> tuple[float, float, str] | None:
+    """Smallest and largest reading of a column, and the likely mistake; None where unknown."""
+    return next((v for k, v in RANGES.items() if name == k or name.endswith(f"/{k}")), None)
+
+
+def _check_kind(kind: Any, kinds: Collection[str], where: str) -> str:
+    """The kind of a log. Raises KembaError where it is none of `kinds`."""
+    if isinstance(kind, str) and kind in kinds:
+        return kind
+    named = " or ".join(f"'kind: {k}'" for k in kinds)
+    near = suggest(kind, kinds) if isinstance(kind, str) else ""
+    hint = near if near.startswith("did you") else ""  # they are all named already
+    raise KembaError(f"{where}: kind", f"'{kind}' is no kind of log", f"{named} was expected", hint)
+
+
+def _check_noise(
+    noise: Any, units: Mapping[str, str], where: str
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Noise (1 sigma, in the column's SI unit) by channel without unit, and the correlation time
+    [s] of those channels that have one; `units` by channel.
+
+    A channel is written as in the log, with or without its unit. The value is a number in that
+    unit, a text such as '0.3 mm', or a group such as `{sigma: 0.3 mm, time: 10 ms}`. Raises
+    KembaError where it is no positive finite number.
+    """
+    if noise is None:
+        return {}, {}
+    if not isinstance(noise, Mapping):
+        expected = "one line per channel was expected, such as 'piston/F [N]: 0.5'"
+        raise KembaError(f"{where}: noise", f"'{noise}' names no channel", expected)
+    found, times = {}, {}
+    for key, value in noise.items():
+        name = str(key).split(" [")[0]
+        if name not in units:
+            continue
+        place, unit = f"{where}: noise: {key}", units[name]
+        written = Quantity.from_header(str(key)).unit if "[" in str(key) else unit
+        if isinstance(value, Mapping):
+            value, times[name] = _group(value, place)
+        sigma = _positive(value, written, unit, place, f"the column is '{name} [{unit}]'")
+        found[name] = sigma
+    return found, times
+
+
+def _group(value: Mapping[str, Any], place: str) -> tuple[Any, float]:
+    """Sigma as written, and correlation time [s], of a group."""
+    if set(value) != {"sigma", "time"}:
+        keys = ", ".join(map(str, value)) or "nothing"
+        expected = "'{sigma: 0.3 mm, time: 10 ms}' was expected"
+        raise KembaError(place, f"the group has {keys}", expected)
+    return value["sigma"], _positive(value["time"], "s", "s", f"{place}: time")
+
+
+def _positive(value: Any, written: str, unit: str, place: str, hint: str = "") -> float:
+    """A number above 0 in `unit`, `written` in another one; `hint` where it is of another kind."""
+    try:
+        number = convert(to_si(value, written), written, unit)
+    except ValueError as error:
+        raise KembaError(place, str(error), hint=hint) from None
+    if not number > 0.0:
+        what = f"the value is {value}; no sensor is without noise"
+        hint = "leave the line out: the noise is then learnt from the log"
+        raise KembaError(place, what, f"a number above 0 in {unit} was expected", hint)
+    return float(number)
+
 
 Kind = Literal["robot", "bench", "cylinder", "drive", "vessel"]
 BODY = ("body/x", "body/z", "body/pitch")
@@ -36,10 +152,10 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
     beside = str(sidecar(path))
-    log.meta["kind"] = check_kind(log.meta["kind"], KINDS, beside)
+    log.meta["kind"] = _check_kind(log.meta["kind"], KINDS, beside)
     if "noise" in log.meta:
         units = {name: log.unit(name) for name in log.names}
-        log.meta["noise"], log.meta["noise_time"] = check_noise(log.meta["noise"], units, beside)
+        log.meta["noise"], log.meta["noise_time"] = _check_noise(log.meta["noise"], units, beside)
     return _without_absurd(_with_torques(log))
 
 
@@ -99,8 +215,8 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     """
     if not paths:
         raise KembaError("", "no log given", "one or more CSV files were expected")
-    unique = sorted({Path(p).resolve(): Path(p) for p in paths}.values(), key=_order)
-    logs = [read_log(p, columns) for p in unique]
+    unique = {Path(p).resolve(): Path(p) for p in paths}.values()
+    logs = [read_log(p, columns) for p in sorted(unique, key=lambda p: (p.name, str(p)))]
     kinds = {log.meta["kind"] for log in logs}
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
@@ -190,7 +306,3 @@ def kind_of(log: Trajectory, where: str | Path = "") -> Kind:
         f"at least {', '.join(BENCH)} of a rig, or body/z and so on of a robot, were expected",
         map_hint(where),
     )
-
-
-def _order(path: Path) -> tuple[str, str]:
-    return path.name, str(path)

@@ -2,19 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from typing import Generic, TypeVar
 
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
-from kemba.identify.problem.line import LINE, LineResistance
-from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
-from kemba.identify.problem.structure import ORIFICE, OrificeShare
+from kemba.identify.problem.structure import LINE, ORIFICE, LineResistance, OrificeShare
+from kemba.identify.problem.types import Candidate, Parameter, Theta
 from kemba.model.evaluation import port_name
 from kemba.model.model import Model
 from kemba.quantity import Param
 
+LINK = "tolerance."  # how names of a link's figures begin
+
+
+def nominal_figures(model: Model, except_for: Iterable[str] = ()) -> dict[str, tuple[float, float]]:
+    """Factor 1 and its 1 sigma by figure, named as `Model.build(scaled=...)` takes them.
+
+    `except_for`: parameters that are free anyway; the figures of their effects are left out.
+    """
+    free = {name.rsplit(".", 1)[0] for name in except_for}
+    return {
+        f"{effect.name}.{figure}": (1.0, share)
+        for effect in model.effects
+        if effect.name not in free
+        for figure, share in effect.tolerances().items()
+    }
+
+
+def link_figures(model: Model) -> dict[str, tuple[float, float]]:
+    """Share 0 by which a link's figure is off, and its 1 sigma, by name; {} for a rig."""
+    found = model.mechanism.tolerances
+    return {f"{LINK}{name}": (0.0, share) for name, share in found.items()}
+
+
+def leg_by_leg(model: Model) -> Model:
+    """The same model with every effect that has nominal figures of its own once per leg: the parts
+    of one leg differ from those of another."""
+    effects: list[Effect] = []
+    for effect in model.effects:
+        if effect.nominal and effect.place == "leg" and effect.leg is None:
+            effects += [effect.bind({"on": leg}) for leg in model.mechanism.legs]
+        else:
+            effects.append(effect)
+    return Model(model.mechanism, effects, model.supply, model.name)
+
+
+T = TypeVar("T")
 SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}
 
 
@@ -52,13 +88,48 @@ def by_default(name: str) -> Effect:
     return BY_KIND[kind].model_validate({"kind": kind, **where})
 
 
-def switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str, ...]:
+def _switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str, ...]:
     """Names of the candidates, sensors left out, that theta switches on."""
     return tuple(
         name
         for name, c in sorted(candidates.items())
         if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
     )
+
+
+class CompiledModels(Generic[T]):
+    """A model compiled with the effects that theta switches on, each set of effects once.
+
+    `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
+    `build` takes a model and the numbers that are left open: free parameters, scaled figures.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        candidates: Mapping[str, Candidate],
+        figures: dict[str, tuple[float, float]],
+        build: Callable[[Model, tuple[str, ...], tuple[str, ...]], T],
+    ) -> None:
+        self.model, self.candidates, self.figures = model, candidates, figures
+        self._build, self._known = build, dict[tuple[str, ...], T]()
+
+    def at(self, theta: Theta) -> T:
+        """The model with the effects on its list that theta switches on."""
+        active = _switched_on(self.candidates, theta)
+        if active not in self._known:
+            present = {e.name for e in self.model.effects}
+            extra = (e for e in map(by_default, active) if e.name not in present)
+            model = self.model.with_effects(extra)
+            keys = (key for name in active for key in tuple(self.candidates[name].keys()))
+            free = tuple(key for key in keys if key in model.parameters)
+            self._known[active] = self._build(model, free, tuple(self.figures))
+        return self._known[active]
+
+    def values(self, theta: Theta, names: Iterable[str]) -> dict[str, float]:
+        """What these open numbers are at theta."""
+        nominal = {name: factor for name, (factor, _) in self.figures.items()}
+        return {name: theta.get(name, nominal.get(name, 0.0)) for name in names}
 
 
 def where_field(kind: str) -> str:

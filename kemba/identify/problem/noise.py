@@ -1,33 +1,151 @@
-"""Coloured noise: a short autoregression, learnt on what a flexible model leaves over."""
+"""Noise of a channel: its steps, its white part, its slow drift, and its colour.
+
+A drift of one sigma moves a reading no further than its noise, but for a second instead of a row,
+and so it looks like a small force, or like a faulty sensor. Colour is a short autoregression,
+learnt on what a flexible model leaves over.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from statistics import NormalDist
+from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
+from typing_extensions import Self
 
-from kemba.identify.problem.drift import DriftNoise, drift_waves
-from kemba.identify.problem.problem import Array, Rows
-from kemba.identify.problem.quantisation import step_of
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_noise import ColourSettings
+from kemba.identify.problem.types import Array, Flags, Labels, Rows
+
+# How the step of a sensor is found.
+# readings closer than this share of their range are one reading: conversion of units rounds in
+# the fifteenth digit, files have six or more
+SAME = 1e-6
+# readings come in steps where most differences of neighbours are whole steps: of what moves
+# without a rest, the smallest difference is its slowest motion
+NEAR = 0.15  # distance from a whole number of steps that rounding in a file makes
+FEW = 5.5  # differences of more steps tell nothing, since the error of the step adds up
+MOST = 0.6  # share of differences that are whole steps; by chance 0.3 are
+# steps of so many sigmas of the noise are coarse: below it, noise makes rounding errors
+# independent (Widrow and Kollar 2008)
+COARSE = 2.0
+LONGEST = 1000  # rows at rest that count as one reading; of a longer rest more count
 
 
-class NoiseSettings:
-    """How the colour of the noise is learnt."""
+def step_of(values: Array) -> float:
+    """The step in which a channel (n,) is read, in its unit; 0 where it has none."""
+    known = np.unique(values[np.isfinite(values)])
+    steps = np.diff(known)
+    if not len(steps):
+        return 0.0
+    steps = steps[steps > SAME * np.ptp(known)]
+    counts = steps / steps.min()
+    counts = counts[counts < FEW]
+    whole = np.abs(counts - np.round(counts)) < NEAR
+    return float(steps.min()) if np.mean(whole) > MOST else 0.0
 
-    order = 4  # largest order of the autoregression: BIC chooses among 0 to this
-    fewest = 50  # rows below which no colour is learnt
-    # smallest noise that is believed, as a share of the sensor's white noise; a flexible model fits
-    # some of the noise
-    least = 0.6
-    trim = 5.0  # residuals beyond so many sigma are clipped: they are switching instants
-    softest = 0.2  # smallest sigma that the clipping assumes
-    spike = 7  # rows that a spike lasts
-    around = 151  # rows around a spike that it is compared with
-    spiky = 5.0  # ratio of mean squares that makes a spike
+
+def is_coarse(step: float, sigma: float) -> bool:
+    """Whether a sensor's step is so much larger than its noise that rounding errors depend on each
+    other."""
+    return step > COARSE * sigma
+
+
+def telling(values: Array, sigma: float) -> Flags:
+    """Rows (n,) that tell something of their own: of readings that stand still, the middle one.
+
+    Readings stand still where they keep to one step, or change to and fro between two. They have
+    one rounding error in common, so that many of them tell no more than one. Where the noise
+    `sigma` is as large as the steps, each reading is rounded by itself and all rows count.
+    """
+    step = step_of(values)
+    if not is_coarse(step, sigma):
+        return np.ones(len(values), dtype=bool)
+    chosen = np.zeros(len(values), dtype=bool)
+    known = np.flatnonzero(np.isfinite(values))
+    level = np.round(values[known] / step).astype(int)
+    first = 0
+    while first < len(level):
+        last = first + _still(level[first:])
+        chosen[known[(first + last - 1) // 2]] = True
+        first = last
+    return chosen
+
+
+def _still(level: Labels) -> int:
+    """How many of the first readings (n,), counted in steps, keep to one level or to two."""
+    level = level[:LONGEST]
+    low, high = np.minimum.accumulate(level), np.maximum.accumulate(level)
+    moved = high - low > 1
+    return int(np.argmax(moved)) if moved.any() else len(moved)
+
+
+class DriftColumnSettings:
+    """Drifts that any sensor may have."""
+
+    waves = 8  # cosines of a run: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s
+    size = 1.0  # sigma of a drift, in stated sigmas: as the noise
+
+
+def drift_waves(time: Array) -> tuple[Array, Array]:
+    """Cosines (n, d) of a run's rows at `time` (n,) [s], and the standard deviations (d,) that make
+    a drift of them."""
+    length = max(float(np.ptp(time)), 1e-9)
+    order = np.arange(float(DriftColumnSettings.waves))
+    return np.cos(np.pi * np.outer((time - time[0]) / length, order)), _sigmas(order, length)
+
+
+def _sigmas(order: Array, length: float) -> Array:
+    """Standard deviations (d,) of cosines that make a lag of unit variance, over `length` [s]."""
+    memory = max(ColourSettings.drifts)
+    variance = np.where(order == 0, 0.5, 1.0) / (1.0 + (np.pi * order * memory / length) ** 2)
+    mean = variance @ np.where(order == 0, 1.0, 0.5)
+    return np.asarray(DriftColumnSettings.size * np.sqrt(variance / mean))
+
+
+@dataclass(frozen=True)
+class DriftNoise:
+    """A drift whose size is not known, in white rows: they have the covariance I + UU'.
+
+    `shape` (n, d): orthonormal; `variance` (d,): of the drift along it.
+    """
+
+    shape: Array
+    variance: Array
+
+    @classmethod
+    def of(cls, columns: Array) -> DriftNoise:
+        """Of columns U (n, d), one per cosine of unit sigma, whitened."""
+        shape, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return cls(shape, size**2)
+
+    def out_of(self, rows: Array) -> Array:
+        """(I + UU')^-1/2 rows, of (n,) or (n, k): white again."""
+        lost = 1.0 - 1.0 / np.sqrt(1.0 + self.variance)
+        return np.asarray(rows - (self.shape * lost) @ (self.shape.T @ rows))
+
+    @property
+    def log_density(self) -> float:
+        """What the drift adds to the log density [nats] of rows that are zero."""
+        return -0.5 * float(np.sum(np.log1p(self.variance)))
+
+
+# How the colour of the noise is learnt.
+ORDER = 4  # largest order of the autoregression: BIC chooses among 0 to this
+FEWEST = 50  # rows below which no colour is learnt
+# smallest noise that is believed, as a share of the sensor's white noise; a flexible model fits
+# some of the noise
+LEAST = 0.6
+TRIM = 5.0  # residuals beyond so many sigma are clipped: they are switching instants
+SOFTEST = 0.2  # smallest sigma that the clipping assumes
+SPIKE = 7  # rows that a spike lasts
+AROUND = 151  # rows around a spike that it is compared with
+SPIKY = 5.0  # ratio of mean squares that makes a spike
 
 
 class WhiteNoiseSettings:
@@ -111,7 +229,7 @@ def learn(residual: Array, order: int | None = None, careful: bool = False) -> C
 
     `careful`: spikes get less weight from now on.
     """
-    order = NoiseSettings.order if order is None else order
+    order = ORDER if order is None else order
     weight = caution(residual) if careful else None
     found = _yule_walker(residual if weight is None else residual * weight, order)
     return replace(found, rows=len(residual), weight=weight)
@@ -126,12 +244,11 @@ def _beside_drift(residual: Array, time: Array, careful: bool) -> Colour:
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:
-    settings = NoiseSettings
-    scale = max(1.4826 * float(np.median(np.abs(residual))), settings.softest)
-    r = np.clip(residual, -settings.trim * scale, settings.trim * scale)
+    scale = max(1.4826 * float(np.median(np.abs(residual))), SOFTEST)
+    r = np.clip(residual, -TRIM * scale, TRIM * scale)
     n = len(r)
-    if n < settings.fewest:
-        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), settings.least))
+    if n < FEWEST:
+        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), LEAST))
     c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
     best, chosen = np.inf, (np.zeros(0), float(c[0]))
     for p in range(order + 1):
@@ -140,7 +257,7 @@ def _yule_walker(residual: Array, order: int) -> Colour:
         bic = n * np.log(power) + p * np.log(n)
         if bic < best - 1e-9:
             best, chosen = bic, (phi, power)
-    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), settings.least))
+    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), LEAST))
 
 
 def caution(residual: Array) -> Array:
@@ -149,10 +266,10 @@ def caution(residual: Array) -> Array:
     At switching instants and reversals the imposed motion is known worst. An error that lasts is
     left alone: it may be physics.
     """
-    settings, power = NoiseSettings, residual**2
-    near, around = (uniform_filter1d(power, rows) for rows in (settings.spike, settings.around))
-    spike = near > settings.spiky * np.maximum(around, 1.0)
-    spike = maximum_filter1d(spike, settings.spike)
+    power = residual**2
+    near, around = (uniform_filter1d(power, rows) for rows in (SPIKE, AROUND))
+    spike = near > SPIKY * np.maximum(around, 1.0)
+    spike = maximum_filter1d(spike, SPIKE)
     return np.where(spike, 1.0 / np.sqrt(np.maximum(near, 1.0)), 1.0)
 
 
@@ -180,3 +297,27 @@ def whitened(rows: Rows, columns: Array, by: Mapping[tuple[int, int], Colour]) -
         own = (rows.run == i) & (rows.channel == k)
         out[own] = whiten(columns[own], colour)
     return np.asarray(out)
+
+
+class ColouredProblem(Problem):
+    """A problem whose noise has a colour of its own in every run and channel.
+
+    `colour` by run and channel; without any, residuals are not whitened. `left` (n,): the residual
+    from which it was learnt.
+    """
+
+    learns_colour = True
+    colour: Mapping[tuple[int, int], Colour] = MappingProxyType({})
+    left: Array | None = None
+
+    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
+        """The same problem with the colour of every run and channel learnt from `residual` (n,), or
+        forgotten."""
+        found = copy(self)
+        found.left = residual
+        found.colour = {} if residual is None else colours(self.rows(), residual, careful)
+        return found
+
+    def whiten(self, columns: Array) -> Array:
+        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
+        return whitened(self.rows(), columns, self.colour)

@@ -8,47 +8,47 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.problem.slopes import StepSettings
 from kemba.identify.problem.types import (
     Array,
     Candidate,
     Changes,
     Flags,
     ForceChannel,
-    Labels,
     Leftover,
     MissingForce,
     OperatingPoint,
     Parameter,
     Rows,
-    Texts,
     Theta,
 )
 from kemba.model.model import Model
 
-__all__ = [
-    "Array",
-    "Candidate",
-    "Changes",
-    "Flags",
-    "ForceChannel",
-    "Labels",
-    "Leftover",
-    "MissingForce",
-    "OperatingPoint",
-    "Parameter",
-    "Problem",
-    "Rows",
-    "Texts",
-    "Theta",
-]
+NUISANCE = 0.5  # step of a nominal figure, in prior sigmas
+PARAMETER = 0.05  # step of a parameter that is on, as a share of its size or value
+ABSURD = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
+
+
+def bounded(residual: Array, absurd: float) -> Array:
+    """Residuals held within `absurd` sigmas; those that are no numbers are as large as that."""
+    return np.asarray(np.clip(np.nan_to_num(residual, nan=absurd), -absurd, absurd))
+
+
+def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:
+    """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
+    `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
+    through its cylinder's end leaves no volume to the air."""
+    absurd = ABSURD
+    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < absurd)]
+    if not known:
+        return np.zeros_like(base)
+    return np.asarray(np.mean([(there[i] - base) / steps[i] for i in known], axis=0))
 
 
 class Problem(ABC):
@@ -79,8 +79,8 @@ class Problem(ABC):
     model: Model  # of the logs; what has none has no file either
 
     @abstractmethod
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
-        """Whitened residuals (n,) of the runs with these indices, in their order (None: all)."""
+    def residual(self, theta: Theta) -> Array:
+        """Whitened residuals (n,) of all runs."""
 
     def residuals(self, thetas: Sequence[Theta]) -> Array:
         """Whitened residuals (n, c) of all runs at each of c thetas; quicker where a problem can
@@ -88,25 +88,23 @@ class Problem(ABC):
         return np.stack([self.residual(theta) for theta in thetas], axis=1)
 
     @abstractmethod
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         """What each row (n,) of `residual` is."""
 
     # Slopes
 
-    def jacobian(
-        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-    ) -> Array:
+    def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """d residual / d names (n, k), per unit of each parameter.
 
         A switch that is off has no useful derivative; it gets a secant (`_secant_step`). The
         default takes finite differences with steps of physical size for all parameters; a column is
         zero where every step leads to no prediction at all.
         """
-        base = self.residual(theta, runs)
+        base = self.residual(theta)
         columns = []
         for name in names:
             steps = list(self.steps(theta, name))
-            slopes = [(self.residual({**theta, **step}, runs) - base) / h for step, h in steps]
+            slopes = [(self.residual({**theta, **step}) - base) / h for step, h in steps]
             known = [slope for slope in slopes if np.isfinite(slope).all()]
             columns.append(np.mean(known, axis=0) if known else np.zeros_like(base))
         return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
@@ -114,10 +112,9 @@ class Problem(ABC):
     def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
         """Steps for a finite difference along `name`: changed entries of theta, and how far they
         go [the parameter's unit]. Two of them where both signs are possible."""
-        settings = StepSettings
         if name in self.nuisance:
             nominal, sigma = self.nuisance[name]
-            h, value = settings.nuisance * sigma, theta.get(name, nominal)
+            h, value = NUISANCE * sigma, theta.get(name, nominal)
             h = -h if value + h > self.limits(name)[1] else h
             yield {name: value + h}, h
             return
@@ -130,7 +127,7 @@ class Problem(ABC):
                 yield {**shapes, name: parameter.off + sign * h}, sign * h
             return
         value = theta[name]
-        h = settings.parameter * (parameter.size if name == candidate.key else abs(value))
+        h = PARAMETER * (parameter.size if name == candidate.key else abs(value))
         h = -h if value + h > parameter.upper else h
         yield {name: value + h}, h
 
@@ -194,7 +191,7 @@ class Problem(ABC):
         sharper the noise, the larger. Default: zero, for noise that stays as it is."""
         return 0.0
 
-    def heard_as(self, other: Problem) -> Self:
+    def with_noise_of(self, other: Problem) -> Self:
         """This problem with the noise colour that `other`, logs of the same sensors, has learnt."""
         return self
 

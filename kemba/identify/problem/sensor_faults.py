@@ -8,23 +8,23 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import REMEASURED, Effect
 from kemba.effects.sensors import SensorEffect, as_measured, as_true
 from kemba.effects.series import Series
-from kemba.identify.problem.problem import Theta
+from kemba.identify.problem.types import Theta
 
 GEOMETRY = "geometry:"  # names of the lengths begin so
 
 
-def fault_kinds() -> dict[str, type[SensorEffect]]:
+def _fault_kinds() -> dict[str, type[SensorEffect]]:
     """Every kind of sensor fault in the catalogue."""
     return {k: e for k, e in BY_KIND.items() if issubclass(e, SensorEffect)}
 
 
 def possible_faults(channel: str) -> dict[str, SensorEffect]:
     """One fault of every kind at a channel, switched off, by name."""
-    found = (cls.model_validate({"channel": channel}) for cls in fault_kinds().values())
+    found = (cls.model_validate({"channel": channel}) for cls in _fault_kinds().values())
     return {fault.name: fault for fault in found}
 
 
-def carriers() -> dict[str, type[Effect]]:
+def _carriers() -> dict[str, type[Effect]]:
     """Every other kind of effect that makes sensors show something wrong, such as a boom whose
     encoders count with another lever."""
     own = (Effect.readings, SensorEffect.readings)
@@ -41,7 +41,7 @@ class SensorFaults:
     def __init__(self, effects: Iterable[Effect] = ()) -> None:
         effects = list(effects)
         self.listed = {e.name: e for e in effects if isinstance(e, SensorEffect)}
-        self._kinds, self._carriers = fault_kinds(), carriers()  # asked for at every prediction
+        self._kinds, self._carriers = _fault_kinds(), _carriers()  # asked for at every prediction
         self.carried = {e.name: e for e in effects if e.kind in self._carriers}
 
     @property
@@ -104,7 +104,7 @@ class SensorFaults:
 def is_fault(name: str) -> bool:
     """Whether a name in theta is a figure that changes what some sensor shows."""
     kind = name.partition(":")[0]
-    return kind in fault_kinds() or kind.partition(".")[0] in carriers()
+    return kind in _fault_kinds() or kind.partition(".")[0] in _carriers()
 
 
 def moves_readings(name: str) -> bool:
@@ -116,5 +116,5 @@ def moves_readings(name: str) -> bool:
 def is_straight(name: str) -> bool:
     """Whether a name in theta is a sensor fault's figure in which the reading is linear."""
     kind, _, rest = name.partition(":")
-    cls = fault_kinds().get(kind)
+    cls = _fault_kinds().get(kind)
     return cls is not None and cls.straight and rest.rpartition(".")[2] in cls.off

@@ -1,7 +1,9 @@
-"""Another structure as a candidate: orifice chambers in place of the first-order ones.
+"""Candidates that need more than their kind: another structure, and the line of the supply.
 
-The share `a` of the rod's force comes from orifice chambers and 1 - a from the chambers of the
-model: 0 is the model as it is, 1 the other structure. So it competes with every other effect.
+Orifice chambers in place of the first-order ones: the share `a` of the rod's force comes from them
+and 1 - a from the chambers of the model, so that 0 is the model as it is and 1 the other structure.
+An orifice of infinite area is as good as none, so the supply line is searched by the reciprocal of
+its area, which is 0 where all of the tank's pressure reaches the valves.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from typing import Annotated, Any, ClassVar
 
 from kemba.effects.base import At, Contribution
 from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply_line import SupplyLine
 from kemba.identify.problem.types import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.quantity import Param, Quantity, Tolerance
@@ -23,21 +26,18 @@ FIGURES = {  # as a model that has orifice chambers calls them: as the candidate
     **{f"orifice_chamber.{k}": k for k in ("a_fill", "a_vent", "V_e", "V_r", "n")},
     "orifice_chamber.gauge": LEVEL,
 }
+
 # effects that those figures stand for, once they are free
 FREE_THEN = ("supply_scale", "rise_time_scale")
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
 
-
-class StructureSettings:
-    """How far the figures of orifice chambers may be from the usual ones: 1 sigma of their
-    logarithm."""
-
-    area = 0.2  # of an orifice's area
-    volume = 0.3  # of a dead volume
-    # of the pressure that reaches the valves: the size of `supply_scale`, which it stands for
-    level = 0.1
-    reach = 4.0  # largest error of a figure, in these sigmas
-    exponent = 0.08  # of the polytropic exponent
+# How far the figures of orifice chambers may be from the usual ones: 1 sigma of their.
+AREA = 0.2  # of an orifice's area
+VOLUME = 0.3  # of a dead volume
+# of the pressure that reaches the valves: the size of `supply_scale`, which it stands for
+STRUCTURE_LEVEL = 0.1
+REACH = 4.0  # largest error of a figure, in these sigmas
+EXPONENT = 0.08  # of the polytropic exponent
 
 
 class OrificeShare(OrificeChamber):
@@ -68,7 +68,7 @@ class OrificeShare(OrificeChamber):
 
     def evaluate(self, at: At) -> Contribution:
         scaled = self.bind({"gauge": tuple(self.level * g for g in self.gauge)})
-        other = OrificeChamber.evaluate(scaled, _Apart(at))  # type: ignore[arg-type]
+        other = OrificeChamber.evaluate(scaled, _OwnPressures(at))  # type: ignore[arg-type]
         own = at.F_e - at.F_r + at.F_mode
         return Contribution(
             effort={"piston": self.a * (other.effort["piston"] - own)},
@@ -76,7 +76,7 @@ class OrificeShare(OrificeChamber):
         )
 
 
-class _Apart:
+class _OwnPressures:
     """`At` in which the chambers' pressures are those of the share."""
 
     def __init__(self, at: At) -> None:
@@ -96,7 +96,7 @@ def structure_candidates(model: Model) -> dict[str, Candidate]:
     shapes = []
     for name, width in _widths().items():
         param, usual = declared[name], float(share.value(name))
-        reach = math.exp(StructureSettings.reach * width)
+        reach = math.exp(REACH * width)
         low, high = max(param.lower, usual / reach), min(param.upper, usual * reach)
         shapes.append(Parameter(name, param.unit, usual, width, low, high, usual))
     lead = Parameter("a", "1", 0.0, 1.0, 0.0, 1.0)
@@ -105,9 +105,9 @@ def structure_candidates(model: Model) -> dict[str, Candidate]:
 
 def _widths() -> dict[str, float]:
     """1 sigma of each figure's logarithm."""
-    areas = dict.fromkeys(("a_fill", "a_vent"), StructureSettings.area)
-    volumes = dict.fromkeys(("V_e", "V_r"), StructureSettings.volume)
-    return {**areas, **volumes, "level": StructureSettings.level, "n": StructureSettings.exponent}
+    areas = dict.fromkeys(("a_fill", "a_vent"), AREA)
+    volumes = dict.fromkeys(("V_e", "V_r"), VOLUME)
+    return {**areas, **volumes, "level": STRUCTURE_LEVEL, "n": EXPONENT}
 
 
 def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
@@ -131,3 +131,38 @@ def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:
     figures = {k: v for k, v in values.items() if k not in ("a", "level")}
     gauge = [float(f"{values.get('level', 1.0) * g:.6g}") for g in OrificeChamber().gauge]
     return {"kind": "orifice_chamber", **figures, "gauge": gauge}
+
+
+LINE = "supply_line"
+
+# Where the supply line's figures are looked for.
+NONE = 1e3  # reciprocal of an orifice that is none [m-2]: 200 times a valve's area
+SIZE = 1.5e5  # reciprocal that is neither small nor large [m-2]
+LARGEST = 1e6  # largest reciprocal: an orifice of 1 mm2 [m-2]
+LINE_VOLUME = 0.7  # prior width of the logarithm of the volume: a factor of two
+LINE_REACH = 30.0  # a volume is looked for within this factor
+
+
+class LineResistance(SupplyLine):
+    """The supply line by the reciprocal `r` of its orifice."""
+
+    r: Annotated[float, Param("m-2", 1.5e5, lower=0.0, doc="1/a, 0: no orifice")] = 0.0
+
+    off: ClassVar[dict[str, float]] = {"r": 0.0}
+    nominal: ClassVar[dict[str, Tolerance]] = {}
+
+    def evaluate(self, at: At) -> Contribution:
+        area = 1.0 / (self.r + NONE)
+        return SupplyLine.evaluate(self.bind({"a": area}), at)  # type: ignore[arg-type]
+
+
+def line_candidates(model: Model) -> dict[str, Candidate]:
+    """The supply line, where the model's chambers publish their flow and it has no line yet."""
+    drawing = any("draw_e" in effect.publishes for effect in model.effects)
+    if not drawing or any(effect.kind == LINE for effect in model.effects):
+        return {}
+    volume = float(SupplyLine().V)
+    lead = Parameter("r", "m-2", 0.0, SIZE, 0.0, LARGEST)
+    ends = (volume / LINE_REACH, volume * LINE_REACH)
+    hose = Parameter("V", "m3", volume, LINE_VOLUME, *ends, volume)
+    return {LINE: Candidate(LINE, lead, (hose,), reciprocal={"r": ("a", "m2")})}

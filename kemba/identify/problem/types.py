@@ -21,12 +21,8 @@ Changes = Mapping[str, tuple[Array, Array]]  # command -> times [s] and sizes of
 
 REGIONS = ("in", "mid", "out")
 
-
-class RegionSettings:
-    """Regions of a piston's stroke."""
-
-    # length of the region at each end of the stroke [m]: as long as the cushion of the catalogue
-    end = 0.010
+# length of the region at each end of the stroke [m]: as long as the cushion of the catalogue
+END = 0.010
 
 
 @dataclass(frozen=True)
@@ -122,7 +118,7 @@ class OperatingPoint:
     def regions(self) -> Texts:
         """Label (n,) of each row: `in` near the retracted end of the stroke, `mid`, `out` near the
         extended end; an empty text without a piston."""
-        end = RegionSettings.end
+        end = END
         ends = np.array([end, self.stroke - end])
         index = np.searchsorted(ends, self.x, side="right")
         return np.array([*REGIONS, ""], dtype=object)[np.where(np.isfinite(self.x), index, -1)]

@@ -17,22 +17,23 @@ from scipy.optimize import least_squares
 from kemba.config import dump_yaml
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-from kemba.identify.evidence.windows import rms
-from kemba.identify.problem.problem import Array, Problem
+from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divisions, half_widths
+from kemba.identify.infer.windows import rms
+from kemba.identify.logs.excerpt import excerpts
+from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.reading import read_logs, taken_on
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
-from kemba.identify.written.joint import TOLD
-from kemba.identify.written.scatter import apart_between_runs, divisions, half_widths
+from kemba.logs import load_map, log_files
+from kemba.model import load_model
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class RigFitSettings:
-    """How the figures of a rig are fitted."""
-
-    loose = 10.0  # prior sigma of a factor that is fitted: as good as none
-    step = 1e-4  # step of finite differences of a factor
-    flat = 1e-5  # smallest pivot of a fit whose figures can be told apart
+LOOSE = 10.0  # prior sigma of a factor that is fitted: as good as none
+STEP = 1e-4  # step of finite differences of a factor
+FLAT = 1e-5  # smallest pivot of a fit whose figures can be told apart
 
 
 @dataclass(frozen=True)
@@ -83,16 +84,19 @@ class RigFit:
         dump_yaml({"name": path.stem, "base": base, "effects": effects, "notes": notes}, path)
 
 
-def fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
+def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
     without a value start at their usual size. Raises KembaError where logs cannot tell them apart.
     """
-    loose = RigFitSettings.loose
+    loose = LOOSE
     started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
     names = [
         name
         for name, (_, value) in started.parameters.items()
-        if value and (name in TOLD or name.split(".")[0] not in {t.split(".")[0] for t in TOLD})
+        if value
+        and (
+            name in RIG_FIGURES or name.split(".")[0] not in {t.split(".")[0] for t in RIG_FIGURES}
+        )
     ]
     make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
@@ -114,7 +118,6 @@ def _started(effect: Effect) -> Effect:
 def _fit(
     problem: Problem, names: list[str], values: Mapping[str, float], model: Model, before: float
 ) -> RigFit:
-    settings = RigFitSettings
     starts = [n for n in problem.nuisance if n.startswith("start:")]
     free = [*names, *starts]
     centre = np.array([problem.nuisance[n][0] for n in free])
@@ -131,20 +134,20 @@ def _fit(
         np.zeros(len(free)),
         bounds=(lower, upper),
         x_scale="jac",
-        diff_step=settings.step,
+        diff_step=STEP,
         method="trf",
     )
     rows = len(problem.rows())
     j, r = found.jac[:rows], found.fun[:rows]
     scale = np.maximum(np.linalg.norm(j, axis=0), 1e-300)
     pivots = np.abs(np.diag(np.linalg.qr(j / scale, mode="r")))
-    if pivots.min() < settings.flat:
+    if pivots.min() < FLAT:
         worst = free[int(np.argmin(pivots))]
         hint = "fix one of them: leave it out of the model, or log another motion"
         raise KembaError(worst, "cannot be told from the other figures by these logs", hint=hint)
     h = np.linalg.inv(j.T @ j + np.diag(known))
     widths = np.max([half_widths(d, j, r, h) for d in divisions(problem)], axis=0)
-    runs = dict(apart_between_runs(problem, j[:, : len(names)], r))
+    runs = dict(conflicts_between_runs(problem, j[:, : len(names)], r))
     figures = []
     for i, name in enumerate(names):
         ends = [-widths[i], widths[i], *runs.get(i, ())]
@@ -179,3 +182,17 @@ def _unit(model: Model, name: str) -> str:
     param = model.parameters[name][0]
     turns = model.mechanism.logged.get("axis/q") == "rad"
     return param.rotary if turns and param.rotary else param.unit
+
+
+def characterise_logs(
+    logs: Sequence[str | Path], model: str, column_map: str | Path | None = None
+) -> RigFit:
+    """The figures of the rig of `model`, and of its effects, from logs (or folders of them).
+
+    Raises KembaError; BadData where the logs cannot be right.
+    """
+    read = read_logs(log_files(logs), load_map(column_map) if column_map else None)
+    built = load_model(model)
+    taken_on(read, built.mechanism)
+    check_logs(read)
+    return _fit_rig(excerpts(read)[0], built)

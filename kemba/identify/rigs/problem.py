@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from copy import copy
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from typing_extensions import Self
 
-from kemba.identify.bench.missing import lagged
-from kemba.identify.problem.noise import Colour, learn, whiten
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.missing_force import missing_along
+from kemba.identify.problem.noise import ColouredProblem, whiten
 from kemba.identify.problem.sensor_faults import is_straight
 from kemba.identify.problem.types import (
     Array,
@@ -21,28 +19,21 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
-from kemba.identify.rigs.candidates import possible_candidates
-from kemba.identify.rigs.predictor import Predictor
+from kemba.identify.rigs.candidates import possible_candidates, sized, usual_force
+from kemba.identify.rigs.prediction import Predictor
 from kemba.identify.rigs.rig_log import RigLog, prepare
-from kemba.identify.rigs.sizes import sized, usual_force
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class RigProblemSettings:
-    """How well the sensors of a rig are known."""
-
-    # prior sigma of the zero of a pressure sensor [Pa]: the pressure of the air changes by 1 kPa (1
-    # sigma) with the weather
-    weather = 1e3
+# prior sigma of the zero of a pressure sensor [Pa]: the pressure of the air changes by 1 kPa (1
+# sigma) with the weather
+WEATHER = 1e3
 
 
-class RigProblem(Problem):
+class RigProblem(ColouredProblem):
     """`Problem` for logs of a cylinder or a drive. One row per judged row of a log: predicted less
-    measured force, over its noise; `colour` of the noise by run. `figures`: more numbers of the
-    model that theta may scale, with 1 sigma of the factor."""
-
-    learns_colour = True
+    measured force, over its noise. `figures`: more numbers of the model that theta may scale, with
+    1 sigma of the factor."""
 
     def __init__(
         self, logs: Sequence[RigLog], model: Model, figures: Mapping[str, float] | None = None
@@ -57,14 +48,13 @@ class RigProblem(Problem):
         self.predictor = predictor
         predictor.candidates = self.candidates
         self.nuisance = predictor.figures | predictor.sensors.nuisance
-        zero = RigProblemSettings.weather
+        zero = WEATHER
         for name in model.mechanism.logged:
             key = f"sensor_bias:{name}"
             if name.endswith("/P") and key not in predictor.sensors.listed:
                 self.nuisance[f"{key}.b"] = (0.0, zero)
                 self.candidates.pop(key, None)
         self._sigma = [np.sqrt(predictor.variance(log, self.usual)) for log in self.logs]
-        self.colour: Mapping[int, Colour] = {}
 
     @property
     def answer(self) -> str:
@@ -76,17 +66,17 @@ class RigProblem(Problem):
         """Unit of that channel."""
         return self.model.mechanism.logged[self.answer]
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         parts = []
-        for i in self._all(runs):
+        for i in range(len(self.logs)):
             with np.errstate(over="ignore"):  # a fit may try what nothing is predicted at
                 r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
-            parts.append(whiten(r, self.colour[i]) if i in self.colour else r)
+            parts.append(whiten(r, self.colour[i, 0]) if (i, 0) in self.colour else r)
         return np.concatenate(parts)
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         still, parts = self.model.mechanism.sign_speed, []
-        for i in self._all(runs):
+        for i in range(len(self.logs)):
             log = self.logs[i]
             n, v = len(log.time), log.speed
             phase = np.where(np.abs(v) < still, "rest", np.where(v > 0, "forward", "back"))
@@ -105,17 +95,6 @@ class RigProblem(Problem):
             {self.answer: self.unit},
         )
 
-    def recolour(self, residual: Array | None, careful: bool = False) -> Self:
-        """The same problem, each run's colour learnt from `residual` (n,), or forgotten."""
-        found = copy(self)
-        found.colour = {}
-        if residual is not None:
-            run = self.rows().run
-            found.colour = {
-                i: learn(residual[run == i], careful=careful) for i in range(len(self.logs))
-            }
-        return found
-
     def coarser(self, theta: Theta) -> Self:
         """The same problem without colour, which forgets what changes slowly, and with what the
         model at theta lacks as noise of all rows alike [N or N.m], beside that of the sensors."""
@@ -130,13 +109,6 @@ class RigProblem(Problem):
         lacks = max(float(np.average(gap**2 - known, weights=1.0 / known)), 0.0)
         found._sigma = [np.sqrt(one + lacks) for one in power]
         return found
-
-    def whiten(self, columns: Array) -> Array:
-        """Columns (n, k) that were not whitened, as `jacobian` would return them."""
-        run, out = self.rows().run, columns.copy()
-        for i, colour in self.colour.items():
-            out[run == i] = whiten(columns[run == i], colour)
-        return np.asarray(out)
 
     def is_straight(self, name: str) -> bool:
         """Whether the residual is linear in a figure."""
@@ -172,22 +144,17 @@ class RigProblem(Problem):
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
         """The force that is missing, per run."""
-        found, known = [], None if strength is None else float(strength[0])
-        for log, sigma in zip(self.logs, self._sigma, strict=True):
-            gap = -self.predictor.gap(log, theta or {})
-            force, spread, used = lagged(log.time, gap, sigma**2, known)
-            found.append(
-                MissingForce(
-                    log.name,
-                    log.time,
-                    (self.answer,),
-                    (self.unit,),
-                    force[:, None],
-                    spread[:, None],
-                    np.array([used]),
-                )
+        return [
+            missing_along(
+                log.name,
+                log.time,
+                -self.predictor.gap(log, theta or {}),
+                sigma**2,
+                (self.answer, self.unit),
+                strength,
             )
-        return found
+            for log, sigma in zip(self.logs, self._sigma, strict=True)
+        ]
 
     def window_errors(self, theta: Theta) -> Mapping[str, Array]:
         """Measured less predicted force (n,)."""
@@ -198,9 +165,6 @@ class RigProblem(Problem):
         """Position (n,) of every row, and whether it moves forward (n,)."""
         place, speed, _ = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
         return place, speed > 0.0
-
-    def _all(self, runs: Collection[int] | None) -> Collection[int]:
-        return range(len(self.logs)) if runs is None else runs
 
     def _seen(self) -> list[tuple[Array, Array, Array]]:
         """Position, rate and measured force (k,) of every run."""

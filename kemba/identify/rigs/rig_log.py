@@ -1,32 +1,181 @@
-"""One log of a cylinder or a drive, prepared for the balance of forces."""
+"""One log of a cylinder or a drive, all its channels through one filter.
+
+A balance of forces holds for filtered channels as it holds for the channels themselves, if each of
+them goes through the same filter ("parallel filtering", M. Gautier, 1997). So the filter costs no
+accuracy of an inertia, and a rate is the difference of the filtered position. What is no linear
+function of the position, such as the weight of a pendulum, is filtered itself: sin(q) behind the
+filter is not the sine of what is behind it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.noise import difference_sigma
 from kemba.identify.problem.types import Array
-from kemba.identify.rigs.filtering import Filtered, filtered
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
+
+# noise of value, rate, acceleration behind a Gaussian of s samples: c sigma / (step^k s^(k + 1/2))
+GAIN = (0.5311, 0.3756, 0.4600)
+
+# How the channels of a rig's log are filtered.
+WIDTHS = (3, 4, 6, 8, 12, 16, 24, 32)  # widths (1 sigma) in samples that are tried
+# noise of the rate that is small enough, as a share of `sign_speed`: the sign of a rate is then
+# certain
+CREEP = 0.2
+# noise of the inertia's force that is small enough, as a share of the force's spread
+WEIGHT = 0.01
+REACH = 4.0  # widths beyond which the Gaussian is cut off: 6e-5 of it is lost
+GAP = 5.0  # rows farther apart than so many usual steps are a gap
+FINEST = 5e-4  # smallest noise, as a share of a channel's range
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """Channels on a regular grid, filtered; the grid has jumps where the log has gaps.
+
+    `time` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name; `read` (n,): the
+    position as it was read. `rows` (k,): indices of the rows that are judged, away from gaps.
+    `q_sigma`, `v_sigma`, `a_sigma`: noise of the filtered position and its rates; `sigma`: noise of
+    the others by name. `width` [s] of the filter. `begins` (m,): first index of every stretch
+    without a gap.
+    """
+
+    time: Array
+    q: Array
+    v: Array
+    a: Array
+    others: dict[str, Array]
+    rows: np.ndarray
+    q_sigma: float
+    v_sigma: float
+    a_sigma: float
+    sigma: dict[str, float]
+    width: float
+    begins: np.ndarray
+    read: Array
+
+    def smoothed(self, values: Array) -> Array:
+        """Values (n,) of the grid behind the filter of the channels."""
+        width = self.width / float(np.median(np.diff(self.time)))
+        return np.concatenate([_smooth(y, width) for y in np.split(values, self.begins[1:])])
+
+
+def filtered(
+    time: Array,
+    position: Array,
+    others: Mapping[str, Array],
+    creep: float,
+    heavy: float = 0.0,
+    known: Mapping[str, float] | None = None,
+    turn: float = np.inf,
+) -> Filtered:
+    """The channels of one log, all through one filter.
+
+    The filter is the narrowest one behind which the rate is known well against `creep` [unit of
+    the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
+    (1 sigma) by name, "" for the position, which a sensor reads anew after each `turn`. Rows with a
+    missing reading are left out.
+    """
+    known = known or {}
+    good = np.isfinite(position) & np.all([np.isfinite(y) for y in others.values()], axis=0)
+    time, position = time[good], position[good]
+    others = {name: y[good] for name, y in others.items()}
+    step = float(np.median(np.diff(time)))
+    finest = FINEST * min(float(np.ptp(position)), turn) / 50
+    noise = known.get("", max(difference_sigma(position), finest))
+    force = max((float(np.std(y)) for y in others.values()), default=1.0)
+    width = next(
+        (s for s in WIDTHS
+         if _rate_noise(noise, step, s) <= CREEP * creep
+         and heavy * _bend_noise(noise, step, s) <= WEIGHT * force),
+        WIDTHS[-1],
+    )  # fmt: skip
+    names = list(others)
+    parts, begins, rows, count = [], [], [], 0
+    for first, last in _stretches(time, GAP * step):
+        n = int((time[last] - time[first]) / step) + 1
+        if n < 2 * REACH * width + 3:
+            continue
+        grid = time[first] + step * np.arange(n)
+        columns = [np.interp(grid, time, y) for y in (position, *others.values())]
+        smooth = [_smooth(y, width) for y in columns]
+        v = np.gradient(smooth[0], step)
+        parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), columns[0], *smooth[1:]]))
+        begins.append(count)
+        edge = int(REACH * width) + 2
+        rows.append(count + np.arange(edge, n - edge, width))
+        count += n
+    if not parts:
+        return _nothing(names)
+    table = np.concatenate(parts, axis=1)
+    sigma = {
+        name: GAIN[0] / np.sqrt(width)
+        * known.get(name, max(difference_sigma(y), FINEST * float(np.ptp(y))))
+        for name, y in others.items()
+    }  # fmt: skip
+    return Filtered(
+        table[0],
+        table[1],
+        table[2],
+        table[3],
+        dict(zip(names, table[5:], strict=True)),
+        np.concatenate(rows),
+        GAIN[0] * noise / np.sqrt(width),
+        _rate_noise(noise, step, width),
+        _bend_noise(noise, step, width),
+        sigma,
+        width * step,
+        np.array(begins),
+        table[4],
+    )
+
+
+def _smooth(values: Array, width: float) -> Array:
+    reach = REACH
+    return np.asarray(gaussian_filter1d(values, width, truncate=reach, mode="nearest"))
+
+
+def _rate_noise(sigma: float, step: float, width: int) -> float:
+    return float(GAIN[1] * sigma / (step * width**1.5))
+
+
+def _bend_noise(sigma: float, step: float, width: int) -> float:
+    return float(GAIN[2] * sigma / (step**2 * width**2.5))
+
+
+def _stretches(time: Array, longest: float) -> list[tuple[int, int]]:
+    """First and last row of every stretch without a longer step."""
+    cuts = np.flatnonzero(np.diff(time) > longest)
+    firsts, lasts = np.append(0, cuts + 1), np.append(cuts, len(time) - 1)
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+
+
+def _nothing(names: list[str]) -> Filtered:
+    none = np.zeros(0)
+    index = np.zeros(0, dtype=int)
+    empty = dict.fromkeys(names, none)
+    zero = dict.fromkeys(names, 0.0)
+    return Filtered(none, none, none, none, empty, index, 0.0, 0.0, 0.0, zero, 0.0, index, none)
+
 
 ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
 PLACE = {"cylinder": "piston/x", "drive": "axis/q"}
 
-
-class RigLogSettings:
-    """Which rows of a rig's log a friction is known in."""
-
-    # travel after a turn within which friction is in doubt, over that in which seals stretch: that
-    # travel is taken to be known to a factor of two
-    doubted = 2.0
-    # time around a turn that the filter mixes into a row, over the filter's width: three sigmas of
-    # the Gaussian
-    blurred = 3.0
+# Which rows of a rig's log a friction is known in.
+# travel after a turn within which friction is in doubt, over that in which seals stretch: that
+# travel is taken to be known to a factor of two
+DOUBTED = 2.0
+# time around a turn that the filter mixes into a row, over the filter's width: three sigmas of
+# the Gaussian
+BLURRED = 3.0
 
 
 @dataclass(frozen=True)
@@ -71,9 +220,9 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     doubt = 0.5 * (high - low)
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
-        settings, step = RigLogSettings, float(np.median(np.diff(found.time)))
-        held = 1.0 - np.abs(_stretch(found, settings.doubted * travel))
-        reach = 2 * int(np.ceil(settings.blurred * found.width / step)) + 1
+        step = float(np.median(np.diff(found.time)))
+        held = 1.0 - np.abs(_stretch(found, DOUBTED * travel))
+        reach = 2 * int(np.ceil(BLURRED * found.width / step)) + 1
         doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])
     return RigLog(name, found, doubt)
 

@@ -2,36 +2,62 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 
 from kemba.effects.series import Series
-from kemba.identify.evidence.refit import RefitSettings
-from kemba.identify.problem.candidates import by_default, sensor_candidates, switched_on
-from kemba.identify.problem.nominal import nominal_figures
-from kemba.identify.problem.problem import Problem
+from kemba.identify.infer.refit import RefitSettings
+from kemba.identify.problem.candidates import CompiledModels, nominal_figures, sensor_candidates
+from kemba.identify.problem.problem import Problem, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
-from kemba.identify.problem.slopes import bounded
 from kemba.identify.problem.types import Array, Rows, Theta
-from kemba.identify.rigs.blow_down import BlowDown
 from kemba.identify.rigs.candidates import standing_candidates
+from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
+from kemba.model.rest import rate_of
 from kemba.trajectory import Trajectory
+
+STEPS = 2000  # steps over a log
+
+
+class BlowDown:
+    """A vessel's model with numbers left free: `free` parameters, `scaled` figures."""
+
+    def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
+        self.names = (*free, *scaled)
+        node = model.build(free, scaled)
+        held = [node.q, node.v, node.a, node.u]
+        still = [ca.SX.zeros(x.sparsity()) for x in held]
+        rate = ca.substitute([rate_of(node)], held, still)[0]
+        h = ca.SX.sym("h")
+        after, _ = midpoint_step(rate, node.s, [node.p], [node.p], h)
+        step = ca.Function("step", [node.s, h, node.p], [ca.densify(after)])
+        self._count = STEPS
+        self._steps = step.mapaccum(self._count)
+
+    def run(
+        self, begin: float, end: float, start: Array, values: Mapping[str, float]
+    ) -> tuple[Array, Array]:
+        """Times (n,) [s] and states (2, n), P [Pa] and T [K], from `start` (2,)."""
+        n, p = self._count, np.array([values[name] for name in self.names]).reshape(-1, 1)
+        h = (end - begin) / n
+        found = np.asarray(self._steps(start, np.full((1, n), h), np.repeat(p, n, axis=1)))
+        states = np.concatenate([np.asarray(start, dtype=float)[:, None], found], axis=1)
+        return np.asarray(begin + h * np.arange(n + 1)), states
+
 
 CHANNELS = ("vessel/P", "vessel/T")
 
-
-class VesselSettings:
-    """How well a vessel's readings and its start are known."""
-
-    noise = 0.01  # noise of a reading over the range of its channel
-    warmth = 0.5  # smallest noise of a temperature [K]: IEC 60584 class 1 allows 1.5 K
-    farthest = 3.0  # largest factor by which a figure is tried off
-    late = 0.02  # usual delay of a sensor, such as a thermometer's, over a log's length
-    start_pressure = 0.02  # prior sigma of the pressure at the start, as a share
-    start_temperature = 3.0  # prior sigma of the temperature at the start [K]
+# How well a vessel's readings and its start are known.
+NOISE = 0.01  # noise of a reading over the range of its channel
+WARMTH = 0.5  # smallest noise of a temperature [K]: IEC 60584 class 1 allows 1.5 K
+FARTHEST = 3.0  # largest factor by which a figure is tried off
+LATE = 0.02  # usual delay of a sensor, such as a thermometer's, over a log's length
+START_PRESSURE = 0.02  # prior sigma of the pressure at the start, as a share
+START_TEMPERATURE = 3.0  # prior sigma of the temperature at the start [K]
 
 
 @dataclass(frozen=True)
@@ -56,14 +82,14 @@ class VesselLog:
 
 def prepare(log: Trajectory, ambient: float) -> VesselLog:
     """The readings of a log; a vessel without a temperature at its first row is at `ambient`."""
-    settings, known = VesselSettings, log.meta.get("noise", {})
+    known = log.meta.get("noise", {})
     readings, sigma = {}, {}
     for name in CHANNELS:
         if name in log:
             good = np.isfinite(log[name])
             readings[name] = (log.time[good], log[name][good])
-            spread = settings.noise * float(np.ptp(readings[name][1]))
-            spread = max(spread, settings.warmth) if name == "vessel/T" else spread
+            spread = NOISE * float(np.ptp(readings[name][1]))
+            spread = max(spread, WARMTH) if name == "vessel/T" else spread
             sigma[name] = float(known.get(name, spread))
     first = {n: (float(t[0]), float(y[0])) for n, (t, y) in readings.items()}
     begin = min(t for t, _ in first.values())
@@ -85,7 +111,6 @@ class VesselProblem(Problem):
         self, logs: Sequence[VesselLog], model: Model, figures: Mapping[str, float] | None = None
     ) -> None:
         self.model, self.logs = model, tuple(logs)
-        settings = VesselSettings
         self.runs = tuple(log.name for log in self.logs)
         sigmas = {n: float(np.median([g.sigma[n] for g in self.logs if n in g.sigma]))
                   for n in CHANNELS if any(n in g.sigma for g in self.logs)}  # fmt: skip
@@ -93,21 +118,21 @@ class VesselProblem(Problem):
         longest = max(log.duration for log in self.logs)
         for name, fault in sensor_candidates(sigmas, model).items():
             if fault.lead.unit == "s":
-                size = settings.late * longest
+                size = LATE * longest
                 fault = replace(fault, lead=replace(fault.lead, size=size))
             self.candidates[name] = fault
         self.sensors, self.figures = SensorFaults(model.effects), nominal_figures(model)
         self.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
-        self._known: dict[tuple[str, ...], BlowDown] = {}
+        self._blow_down = CompiledModels(model, self.candidates, self.figures, BlowDown)
         starts = {}
         for i, log in enumerate(self.logs):
-            starts[f"start:vessel/P[{i}]"] = (0.0, settings.start_pressure * log.start[0])
-            starts[f"start:vessel/T[{i}]"] = (0.0, settings.start_temperature)
+            starts[f"start:vessel/P[{i}]"] = (0.0, START_PRESSURE * log.start[0])
+            starts[f"start:vessel/T[{i}]"] = (0.0, START_TEMPERATURE)
         self.nuisance = self.figures | self.sensors.nuisance | starts
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         parts = []
-        for i in self._all(runs):
+        for i in range(len(self.logs)):
             log, expected = self.logs[i], self.expected(theta, i)
             parts += [
                 (expected[name] - y) / log.sigma[name] for name, (_, y) in log.readings.items()
@@ -117,9 +142,9 @@ class VesselProblem(Problem):
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""
         log = self.logs[index]
-        blow, values = self._blow_down(theta), self._values(theta)
+        blow, values = self._blow_down.at(theta), self._values(theta)
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
-        far = VesselSettings.farthest
+        far = FARTHEST
         start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, 1.0 / far, far)
         time, states = blow.run(log.begin, log.begin + log.duration, start, values)
         found = {}
@@ -129,10 +154,10 @@ class VesselProblem(Problem):
             found[name] = np.interp(at, time, shown)
         return found
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         names = tuple(n for n in CHANNELS if any(n in g.readings for g in self.logs))
         parts = []
-        for i in self._all(runs):
+        for i in range(len(self.logs)):
             log = self.logs[i]
             for name, (time, _) in log.readings.items():
                 n = len(time)
@@ -144,24 +169,11 @@ class VesselProblem(Problem):
         units = {"vessel/P": "Pa", "vessel/T": "K"}
         return Rows(run, channel, time, label, nothing, names, sigma, units)
 
-    def _all(self, runs: Collection[int] | None) -> Collection[int]:
-        return range(len(self.logs)) if runs is None else runs
-
-    def _blow_down(self, theta: Theta) -> BlowDown:
-        active = switched_on(self.candidates, theta)
-        if active not in self._known:
-            model = self.model.with_effects(by_default(name) for name in active)
-            keys = [key for name in active for key in tuple(self.candidates[name].keys())]
-            self._known[active] = BlowDown(model, tuple(keys), tuple(self.figures))
-        return self._known[active]
-
     def _values(self, theta: Theta) -> dict[str, float]:
-        nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        values = {n: theta.get(n, nominal.get(n, 0.0)) for n in self._blow_down(theta).names}
-        far = VesselSettings.farthest  # beyond, nothing can be predicted
-        return {
-            n: float(np.clip(v, 1.0 / far, far)) if n in nominal else v for n, v in values.items()
-        }
+        values = self._blow_down.values(theta, self._blow_down.at(theta).names)
+        least, most = 1.0 / FARTHEST, FARTHEST  # beyond, nothing can be predicted
+        return {n: float(np.clip(v, least, most)) if n in self.figures else v
+                for n, v in values.items()}  # fmt: skip
 
 
 def vessel_problem(

@@ -9,9 +9,8 @@ from kemba.identify.problem.candidates import (
     geometry_candidates,
     leg_candidates,
 )
-from kemba.identify.problem.line import line_candidates
-from kemba.identify.problem.problem import Candidate, Parameter
-from kemba.identify.problem.structure import structure_candidates
+from kemba.identify.problem.structure import line_candidates, structure_candidates
+from kemba.identify.problem.types import Candidate, Parameter
 from kemba.model.model import Model
 
 GROUND = ("ground_compliance", "ground_friction", "contact")
@@ -19,14 +18,9 @@ SHARED = ("supply_scale",)  # one supply feeds all legs
 SOFTNESS = "ground_compliance.softness"
 GRIP = "ground_friction.mu"
 LAGS = ("hose_lag.T", "motor_lag.T")
-
-
-class RobotCandidateSettings:
-    """Ground and lags, as robot logs can show them."""
-
-    none = 1e-6  # a lag that is none [s]: far below a row
-    softness = 5e-5  # size of a ground's softness [m.N-1]
-    softest = 1e-3  # largest softness of a ground [m.N-1]
+NONE = 1e-6  # a lag that is none [s]: far below a row
+ROBOT_CANDIDATE_SOFTNESS = 5e-5  # size of a ground's softness [m.N-1]
+SOFTEST = 1e-3  # largest softness of a ground [m.N-1]
 
 
 def robot_candidates(model: Model) -> dict[str, Candidate]:
@@ -38,11 +32,10 @@ def robot_candidates(model: Model) -> dict[str, Candidate]:
     apart = leg_candidates(model, [n for n in found if n not in (*GROUND, *SHARED)])
     found = {**found, **apart, **geometry_candidates(model), **structure_candidates(model)}
     found |= line_candidates(model)
-    settings = RobotCandidateSettings
     if "ground_compliance" in found:
         found["ground_compliance"] = Candidate(
             "ground_compliance",
-            Parameter("softness", "m.N-1", 0.0, settings.softness, 0.0, settings.softest),
+            Parameter("softness", "m.N-1", 0.0, ROBOT_CANDIDATE_SOFTNESS, 0.0, SOFTEST),
             (Parameter("d", "s.m-1", 1.0, 0.7, 0.1, 10.0, 1.0),),
             reciprocal={"softness": ("k", "N.m-1")},
         )
@@ -75,4 +68,4 @@ def ground_of(model: Model) -> tuple[float, dict[str, float]]:
 def without_delay(name: str, value: float) -> float:
     """A lag too short to matter as the model should have it: none."""
     short = name in LAGS and value < CandidateSettings.fastest
-    return RobotCandidateSettings.none if short else value
+    return NONE if short else value

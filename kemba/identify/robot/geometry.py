@@ -18,11 +18,10 @@ from scipy.optimize import least_squares
 
 from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import Reference
-from kemba.identify.robot.dynamics.samples import SampleMap
-from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.contact import steady
+from kemba.identify.robot.batch import Batch
+from kemba.identify.robot.contact import steady
+from kemba.identify.robot.physics import Physics, SampleMap
+from kemba.identify.robot.reference import Reference
 from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
 

@@ -19,29 +19,24 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.problem.types import Array
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.identify.robot.batch import ResampledLog
+from kemba.identify.robot.physics import Physics
 
 Columns = Mapping[str, Array]
 Change = Callable[[Columns], dict[str, Array]]
 OTHER_ZERO = "body/z counts from another zero"
 HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
-
-
-class MixUpSettings:
-    """When the columns of a robot log are said to be mixed up."""
-
-    carried = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
-    window = 0.05  # time in which a standing foot does not move [s]
-    row = 0.005  # distance of the rows that are looked at [s]
-    fewest = 10  # rows on the ground from which feet can be judged
-    # typical error of a standing foot that no mix-up would leave [m]: a late encoder moves a foot
-    # by 9 mm
-    small = 0.012
-    better = 4.0  # factor by which a mix-up must make the feet stand better
-    # height by which the zero of body/z must be off where other lengths make feet stand, too [m]
-    zero = 0.05
-    alike = 1.5  # factor within which hypotheses of as many mistakes cannot be told
+CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
+WINDOW = 0.05  # time in which a standing foot does not move [s]
+ROW = 0.005  # distance of the rows that are looked at [s]
+FEWEST = 10  # rows on the ground from which feet can be judged
+# typical error of a standing foot that no mix-up would leave [m]: a late encoder moves a foot
+# by 9 mm
+SMALL = 0.012
+BETTER = 4.0  # factor by which a mix-up must make the feet stand better
+# height by which the zero of body/z must be off where other lengths make feet stand, too [m]
+ZERO = 0.05
+ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told
 
 
 @dataclass(frozen=True)
@@ -59,14 +54,14 @@ def mixed_up(physics: Physics, log: ResampledLog, lengths: bool = False) -> Iter
     `lengths`: other lengths of the legs make feet stand as well; then one mistake must do, for two
     say no more than a length does.
     """
-    limits, feet = MixUpSettings, _Feet(physics, log)
-    feet.least = limits.zero if lengths else 0.0
+    feet = _Feet(physics, log)
+    feet.least = ZERO if lengths else 0.0
     most = 1 if lengths else 2
     error = feet.restless([])
-    if error is None or error < limits.small:
+    if error is None or error < SMALL:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
-    goal = min(limits.small, error / limits.better)
+    goal = min(SMALL, error / BETTER)
     for count in range(1, most + 1):
         trials = []
         for some in combinations(known, count):
@@ -86,7 +81,7 @@ def _said(
 ) -> KembaError:
     """The best hypothesis, and others that the feet cannot tell from it."""
     best = min(e for e, _ in fitting)
-    close = [some for e, some in fitting if e <= MixUpSettings.alike * best]
+    close = [some for e, some in fitting if e <= ALIKE * best]
     texts = [" and ".join(m.text for m in some) for some in close]
     offset = next(
         (f for some in close[:1] for m in some if (f := feet.offset(some, m)) is not None), None
@@ -175,11 +170,10 @@ class _Feet:
     def __init__(self, physics: Physics, log: ResampledLog) -> None:
         self.physics, self.log = physics, log
         self.least = 0.0  # zero of body/z that is a mistake, at least [m]
-        limits = MixUpSettings
         self.step = float(np.median(np.diff(log.time)))
-        self.half = max(1, round(0.5 * limits.window / self.step))
+        self.half = max(1, round(0.5 * WINDOW / self.step))
         good = np.isfinite(log.y)
-        self.enough = bool(np.all(good.sum(axis=0) > limits.fewest))
+        self.enough = bool(np.all(good.sum(axis=0) > FEWEST))
         self.enough &= len(log.time) > 4 * self.half
         self.y = {
             name: np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i])
@@ -197,7 +191,7 @@ class _Feet:
         if not self.enough:
             return None
         places, rows = self._places(some)
-        if len(rows) < MixUpSettings.fewest:
+        if len(rows) < FEWEST:
             return None
         before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
         lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
@@ -229,11 +223,11 @@ class _Feet:
     def _places(self, some: Sequence[MixUp]) -> tuple[Array, np.ndarray]:
         """Places (n, legs, 2) of the feet [m], and the rows at which the ground carries the robot,
         half a window from the ends at least."""
-        limits, half, y = MixUpSettings, self.half, self._changed(some)
+        half, y = self.half, self._changed(some)
         columns = np.stack([y[name] for name in self.physics.channels], axis=1)
         fall = local_fit(columns[:, 1], half, self.step, 2, 2)
-        rows = np.arange(half, len(columns) - half, max(1, round(limits.row / self.step)))
-        rows = rows[fall[rows] > -limits.carried]
+        rows = np.arange(half, len(columns) - half, max(1, round(ROW / self.step)))
+        rows = rows[fall[rows] > -CARRIED]
         count, p = len(self.physics.legs), self.physics.nominal
         wanted = np.unique(np.concatenate([rows - half, rows, rows + half]))
         known = columns[wanted]

@@ -1,17 +1,180 @@
-"""Noise of a robot's sensors: as the sidecar states it, or learnt from what a model leaves over."""
+"""Noise of a robot's sensors: white noise and lags as states of the filter, stated or learnt.
+
+A first-order lag of white noise is AR(1) noise: an exponential memory. The sum of white noise and
+two lags also describes quantised channels and slow drift. It keeps its meaning where rows are
+missing or nodes are not evenly spaced, which an AR model of rows does not. Where the noise is
+learnt from the filter's errors, missing forces are kinds of noise, too, so that what a model lacks
+is not taken for the noise of a sensor.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kemba.identify.problem.sensor_noise import ChannelNoise, ColourSettings
+from kemba.identify.problem.sensor_noise import (
+    ChannelNoise,
+    ColourSettings,
+    Kind,
+    chosen_noise,
+    covariances,
+    lag_noise,
+    pairs,
+    weighted,
+)
 from kemba.identify.problem.types import Array
-from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.colour import Noise
-from kemba.identify.robot.motion.learnt import learnt_noise
-from kemba.identify.robot.state import LinearisedState
+from kemba.identify.robot.batch import Batch
+from kemba.identify.robot.filter import FilterGains, System, innovations
+
+Noise = Sequence[ChannelNoise]  # one per channel; empty: all are white
+
+
+def _is_white(noise: Noise) -> bool:
+    """Whether no channel has a lag, nor another sigma than the stated one."""
+    return all(channel == ChannelNoise() for channel in noise)
+
+
+def coloured(system: System, noise: Noise, sigma: Array, h: Array) -> System:
+    """The filter's system with every lag of `noise` as one more state.
+
+    `system`: white, with the channels as its first rows; `sigma` (L, m): stated noise of each run's
+    channels; `h` (n, L) [s]: length of each step.
+    """
+    if _is_white(noise):
+        return system
+    lags = [(i, s, memory) for i, c in enumerate(noise) for s, memory in c.lags]
+    n, runs, m, d = system.H.shape
+    more, j = len(lags), system.G.shape[-1]
+    channel = np.array([i for i, _, _ in lags], dtype=int)
+    size = sigma[:, channel] * np.array([s for _, s, _ in lags])  # (L, lags)
+    keep = np.exp(-h[..., None] / np.array([memory for _, _, memory in lags]))
+    at = np.arange(more)
+    F, G = np.zeros((n, runs, d + more, d + more)), np.zeros((n, runs, d + more, j + more))
+    W, H = np.zeros((n, runs, j + more, j + more)), np.zeros((n, runs, m, d + more))
+    P0 = np.zeros((runs, d + more, d + more))
+    F[..., :d, :d], G[..., :d, :j], W[..., :j, :j] = system.F, system.G, system.W
+    H[..., :d], P0[:, :d, :d] = system.H, system.P0
+    F[..., d + at, d + at], G[..., d + at, j + at] = keep, 1.0
+    W[..., j + at, j + at] = (1.0 - keep**2) * size**2
+    H[..., channel, d + at] = 1.0
+    P0[:, d + at, d + at] = size**2
+    R = system.R.copy()
+    R[..., : len(noise)] *= np.array([c.white for c in noise]) ** 2
+    return replace(system, F=F, G=G, W=W, H=H, R=R, P0=P0, lags=more)
+
+
+def simulated(system: System, draws: int, rng: np.random.Generator) -> Array:
+    """Sensor noise (n, L, m, draws) as `system` describes it: white noise and lags."""
+    sigma = np.sqrt(np.where(np.isfinite(system.R), system.R, 0.0))
+    y = sigma[..., None] * rng.standard_normal((*sigma.shape, draws))
+    if not system.lags:
+        return np.asarray(y)
+    own = slice(-system.lags, None)
+    start = np.sqrt(np.diagonal(system.P0[:, own, own], axis1=1, axis2=2))
+    drive = np.sqrt(np.diagonal(system.W[..., own, own], axis1=2, axis2=3))
+    keep = np.diagonal(system.F[..., own, own], axis1=2, axis2=3)
+    x = start[..., None] * rng.standard_normal((*start.shape, draws))
+    for k in range(len(y)):
+        y[k] += system.H[k][..., own] @ x
+        x = keep[k][..., None] * x + drive[k][..., None] * rng.standard_normal(x.shape)
+    return np.asarray(y)
+
+
+DRAWS = 6  # simulated logs
+WIDTH = 21  # nodes over which the power is averaged; odd
+LEAST = 0.02  # smallest power
+
+
+def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
+    """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
+
+    It is below 1 where the filter allows for contact forces that a steady stance does not need.
+    The draws are few, so that their power is averaged over some nodes.
+    """
+    rng = np.random.default_rng(seed)
+    y = simulated(system, DRAWS, rng)
+    power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
+    width = WIDTH
+    padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
+    total = np.cumsum(padded, axis=0)
+    total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
+    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, LEAST))
+
+
+def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:
+    """y (n, L, m) minus its prediction, begun anew on the reference every so many steps.
+
+    In the channels' units: how far the model's motion leaves the measured one in a window; `g`
+    (n, L, j): accelerations of the first j channels of G.
+    """
+    n, runs, m, d = system.H.shape
+    push = (system.G[..., : g.shape[2]] @ g[..., None])[..., 0]
+    errors = np.empty((n, runs, m))
+    x = np.zeros((runs, d))
+    for k in range(n):
+        if k % steps == 0:
+            x = np.zeros((runs, d))
+        errors[k] = y[k] - (system.H[k] @ x[..., None])[..., 0]
+        x = (system.F[k] @ x[..., None])[..., 0] + push[k]
+    return errors
+
+
+def learnt_noise(
+    system: System,
+    gain: FilterGains,
+    errors: Array,
+    sigma: Array,
+    h: Array,
+    pushes: Sequence[Array],
+    most: Array,
+    drifts: bool,
+) -> tuple[ChannelNoise, ...]:
+    """Noise of every channel, in units of its stated sigma.
+
+    `errors` (n, L, m): whitened errors of a flexible model, NaN where there is none. `sigma`
+    (L, channels): stated noise; `h` (n, L) [s]. `pushes`: acceleration (n, L, k) per unit of every
+    force that may be missing. `most` (channels,): largest spread that is believed. `drifts`: slow
+    drifts are looked for as well; only where the model is good, for what it lacks is slow, too.
+    """
+    settings, channels = ColourSettings, sigma.shape[1]
+    counts = pairs(errors)
+    measured = covariances(errors[..., None], errors, counts)
+    known = counts[:channels, 0] >= settings.fewest
+    if not known.any():
+        return tuple(ChannelNoise() for _ in range(channels))
+    kinds: list[Kind] = []
+    columns: list[Array] = []
+    memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
+    m = system.H.shape[2]
+    for channel in range(channels):
+        y = np.concatenate([_channel_noise(t, channel, sigma, h, m) for t in memories], axis=-1)
+        seen = innovations(system, gain, y, None)
+        parts = np.split(seen, len(memories), axis=-1)
+        columns += [covariances(part, errors, counts) for part in parts]
+        kinds += [Kind(channel, memory) for memory in memories]
+    for i, push in enumerate(pushes):
+        seen = innovations(system, gain, None, _force_noise(settings.force, push, h))
+        columns.append(covariances(seen, errors, counts))
+        kinds.append(Kind(channels + i, settings.force))
+    return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
+
+
+def _channel_noise(memory: float, channel: int, sigma: Array, h: Array, m: int) -> Array:
+    """Noise (n, L, m, draws) of one channel, of one stated sigma; `memory` [s]: 0 is white."""
+    draws = ColourSettings.draws
+    rng = np.random.default_rng(17 + channel)
+    y = np.zeros((*h.shape, m, draws))
+    y[:, :, channel] = sigma[:, channel, None] * lag_noise(memory, h, draws, rng)
+    return y
+
+
+def _force_noise(memory: float, push: Array, h: Array) -> Array:
+    """Accelerations (n, L, k, draws) of one force of unit sigma."""
+    draws = ColourSettings.draws
+    force = lag_noise(memory, h, draws, np.random.default_rng(5))
+    return np.asarray(push[..., None] * force[:, :, None])
 
 
 class SensorNoiseSettings:
@@ -46,25 +209,3 @@ def with_drifts(noise: Noise, batch: Batch) -> tuple[ChannelNoise, ...]:
         c if drifts(c) or np.isfinite(memory) else replace(c, lags=(*c.lags, (1.0, slowest)))
         for c, memory in zip(channels, batch.memory, strict=True)
     )
-
-
-def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
-    """The noise of each channel, learnt from the rows `left` (rows,) that a flexible model leaves;
-    as stated where a correlation time is stated. `drifts`: slow drifts are looked for, too."""
-    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings
-    k = motion.ref.q.shape[2]
-    pushed = motion.inverse @ motion.channels[..., :k]
-    most = np.where(batch.stated, settings.stated, settings.guessed)
-    found = learnt_noise(
-        motion.system,
-        state.gain,
-        state.spread(left),
-        batch.sigma,
-        batch.h,
-        [pushed[..., i] for i in range(k)],
-        most,
-        drifts,
-    )
-    stated = stated_noise(batch)
-    known = np.isfinite(batch.memory)
-    return tuple(s if on else f for s, f, on in zip(stated, found, known, strict=True))

@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 from typing_extensions import Self
 
+from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Problem, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
-from kemba.identify.problem.slopes import mean_slope
 from kemba.identify.problem.structure import (
     FIGURES,
     FREE_THEN,
@@ -31,32 +31,36 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
+from kemba.identify.robot.batch import Batch, resample
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import first_reference
-from kemba.identify.robot.dynamics.settings import ForceDensity
-from kemba.identify.robot.force_channels import robot_force_channels
-from kemba.identify.robot.formulas import formula_columns
+from kemba.identify.robot.forces import formula_columns, robot_force_channels, robot_missing
 from kemba.identify.robot.geometry import remarks, standing_lengths
-from kemba.identify.robot.labels import describe
-from kemba.identify.robot.missing import robot_missing
-from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.colour import Noise
-from kemba.identify.robot.motion.expected import expected_power, predicted_error
-from kemba.identify.robot.motion.resampled import resample
-from kemba.identify.robot.noise import learnt_from, stated_noise, with_drifts
-from kemba.identify.robot.operating_point import changes, robot_operating_point
-from kemba.identify.robot.state import LinearisedState, linearise_at
-from kemba.identify.robot.validate import faults_of
+from kemba.identify.robot.mix_ups import mixed_up
+from kemba.identify.robot.noise import (
+    Noise,
+    expected_power,
+    predicted_error,
+    stated_noise,
+    with_drifts,
+)
+from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.reference import ForceDensity, first_reference
+from kemba.identify.robot.rows import changes, describe, robot_operating_point
+from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
+from kemba.identify.robot.validate import (
+    BETTER,
+    HINT,
+    contradictions,
+    is_absurd,
+    turned_pitch,
+    turned_torques,
+    valve_mix_ups,
+)
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
-
-class RobotProblemSettings:
-    """Over how long the errors of robot logs are summed."""
-
-    window = 20  # rows over which one-step errors are summed
-    predicted = 0.05  # time of a prediction that tells an error in a channel's unit [s]
+WINDOW = 20  # rows over which one-step errors are summed
+PREDICTED = 0.05  # time of a prediction that tells an error in a channel's unit [s]
 
 
 class RobotProblem(Problem):
@@ -80,7 +84,7 @@ class RobotProblem(Problem):
         figures: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.logs = tuple(logs)
-        self.window = RobotProblemSettings.window  # innovations are one-step errors
+        self.window = WINDOW  # innovations are one-step errors
         self.model, self.unknown = model, unknown or ForceDensity()
         if any(log.meta.get("torques") is False for log in logs):
             self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
@@ -166,7 +170,7 @@ class RobotProblem(Problem):
         """That of the innovations' whitener."""
         return float(np.log(np.diagonal(self.state.gain.whitener, 0, 2, 3)[self.state.mask]).sum())
 
-    def heard_as(self, other: Problem) -> Self:
+    def with_noise_of(self, other: Problem) -> Self:
         """This problem with the noise that another one, of the same sensors, has learnt."""
         return self._with_noise(other.state.noise) if isinstance(other, RobotProblem) else self
 
@@ -175,30 +179,28 @@ class RobotProblem(Problem):
         found.state = self.state.with_noise(noise)
         return found
 
-    def residual(self, theta: Theta, runs: Collection[int] | None = None) -> Array:
+    def residual(self, theta: Theta) -> Array:
         """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
-        return self.state.pick(self.state.residuals([theta]), runs)[:, 0]
+        return self.state.pick(self.state.residuals([theta]))[:, 0]
 
     def residuals(self, thetas: Sequence[Theta]) -> Array:
         """The same (n, c) at each theta; the filter takes them side by side."""
         return np.stack(list(self.state.each_residual(thetas)), axis=1)
 
-    def jacobian(
-        self, theta: Theta, names: Iterable[str], runs: Collection[int] | None = None
-    ) -> Array:
+    def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """Derivatives (n, k) where the force is linear in the parameter, else secants."""
         names = list(names)
         if not names:
-            return np.empty((len(self.residual(theta, runs)), 0))
+            return np.empty((len(self.residual(theta)), 0))
         # the shapes of absent effects have their typical value
         typical = {k: v.typical for k, v in self.parameters().items() if np.isfinite(v.typical)}
         direct = [n for n in names if self._is_direct(n)]
-        found = self.state.slopes({**typical, **theta}, direct, runs)
+        found = self.state.slopes({**typical, **theta}, direct)
         columns = dict(zip(direct, found, strict=True))
         steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
         if steps:
             moved = [{**theta, **step} for group in steps.values() for step, _ in group]
-            there = self.state.each_residual([theta, *moved], runs)
+            there = self.state.each_residual([theta, *moved])
             base = next(there)
             for name, group in steps.items():
                 ends = [next(there) for _ in group]
@@ -220,13 +222,9 @@ class RobotProblem(Problem):
         """Whether residuals are linear in it: effects without memory, bias and scale of sensors."""
         return self._is_direct(name) or is_straight(name)
 
-    def rows(self, runs: Collection[int] | None = None) -> Rows:
+    def rows(self) -> Rows:
         """What each row of `residual` is."""
-        chosen = list(range(len(self.runs)) if runs is None else runs)
-        state = self.state
-        return describe(
-            state.physics, state.batch, state.schedules, state.motion.states[1], state.mask, chosen
-        )
+        return describe(self.state)
 
     def expected_power(self) -> Array:
         """Mean square (n,) that each row would have if the model were right."""
@@ -238,7 +236,7 @@ class RobotProblem(Problem):
         the measured motion; contact forces are the data's."""
         state, batch = self.state, self.batch
         row = float(np.median(batch.h[batch.valid]))
-        steps = max(2, round(RobotProblemSettings.predicted / row))
+        steps = max(2, round(PREDICTED / row))
         y = np.nan_to_num(state.measurement(theta))
         errors = predicted_error(state.motion.system, y, state.acceleration(theta), steps)
         return {
@@ -267,15 +265,42 @@ class RobotProblem(Problem):
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's. Raises BadData where
         a log contradicts itself or any model."""
-        if faults := faults_of(self):
+        if faults := self._faults():
             raise BadData(faults)
         return remarks(self.standing)
 
-    def of_logs(self, logs: Sequence[Trajectory]) -> RobotProblem:
-        """The same question of other logs."""
-        return type(self)(logs, self.model, self.unknown)
+    def _faults(self) -> list[KembaError]:
+        """What is wrong with the logs, the simplest first: columns by the feet alone, the sign of
+        torques, then what no model explains, and the valves if they are the reason."""
+        logs, lengths = self.batch.resampled, bool(self.lengths)
+        if faults := [f for log in logs for f in mixed_up(self.physics, log, lengths)]:
+            return faults
+        if self.standing.turned:
+            return [turned_pitch(self.runs)]
+        r, rows = self.residual(self.lengths), self.rows()
+        if faults := list(turned_torques(self.state, rows, r)):
+            return faults
+        if is_absurd(self.physics.channels, rows, r) and (faults := self._valve_faults(r)):
+            return faults
+        return list(contradictions(self.state, rows, r, self._sensor_columns))
 
-    def sensor_columns(self) -> Array:
+    def _valve_faults(self, r: Array) -> list[KembaError]:
+        """The mistake about the valves after which the logs contradict the model no more, and leave
+        a residual much smaller than r (n,); the best of them."""
+        found = []
+        for text, logs in valve_mix_ups(self.logs, self.physics.legs):
+            other = type(self)(logs, self.model, self.unknown)
+            left = other.residual(other.lengths)
+            if not list(contradictions(other.state, other.rows(), left, other._sensor_columns)):
+                found.append((float(np.sqrt(np.mean(left**2))), text))
+        before = float(np.sqrt(np.mean(r**2)))
+        after, text = min(found, default=(before, ""))
+        if after > before / BETTER:
+            return []
+        what = f"the logs err by {before:.1f} times their noise, and by {after:.1f} times then"
+        return [KembaError(", ".join(self.runs), text, what, HINT)]
+
+    def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""
         faults = [c for c in self.candidates.values() if moves_readings(c.key)]
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]

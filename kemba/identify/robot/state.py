@@ -8,38 +8,35 @@ states are free; contact and stop forces are unknown where the data show contact
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
+from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags, Theta
+from kemba.identify.robot.air import Forces, air_states, read_inputs
+from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
-from kemba.identify.robot.dynamics.forces import Forces
-from kemba.identify.robot.dynamics.inputs import air_states, read_inputs
-from kemba.identify.robot.dynamics.linear import LinearisedMotion, linearise_along, smoothed
-from kemba.identify.robot.dynamics.physics import Physics
-from kemba.identify.robot.dynamics.reference import (
+from kemba.identify.robot.contact import ContactSchedule, loaded
+from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
+from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
+from kemba.identify.robot.noise import Noise, SensorNoiseSettings, learnt_noise, stated_noise
+from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.reference import (
+    LOOSE,
+    ForceDensity,
     Reference,
     densities,
     first_reference,
     read_schedules,
 )
-from kemba.identify.robot.dynamics.settings import LOOSE, ForceDensity
-from kemba.identify.robot.motion.batch import Batch
-from kemba.identify.robot.motion.colour import Noise
-from kemba.identify.robot.motion.contact import ContactSchedule, loaded
-from kemba.identify.robot.motion.filter import FilterGains, at_once, gains, innovations
-from kemba.identify.robot.motion.sensing import ahead, sensed, whole_rows
+from kemba.identify.robot.sensing import ahead, sensed, whole_rows
 
-
-class StateSettings:
-    """How the motion of robot logs is found."""
-
-    rounds = 2  # times that the motion is smoothed with the model
-    lead_in = 4  # nodes at the start that only tell where a run begins
+ROUNDS = 2  # times that the motion is smoothed with the model
+LEAD_IN = 4  # nodes at the start that only tell where a run begins
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ class LinearisedState:
     @cached_property
     def _at_base(self) -> Array:
         """Free parameters (k,) where the model was linearised."""
-        return values_at(self.physics, self.base)[0]
+        return _values_at(self.physics, self.base)[0]
 
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
@@ -89,7 +86,7 @@ class LinearisedState:
     def seen(self, theta: Theta) -> tuple[Array, Array]:
         """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
         of a robot with the lengths at theta."""
-        p, _ = values_at(self.physics, theta)
+        p, _ = _values_at(self.physics, theta)
         at = self._at_base
         own = self.physics.lengths
         if np.array_equal(p[own], at[own]):
@@ -100,17 +97,15 @@ class LinearisedState:
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
-        force = self.forces.at(*values_at(self.physics, theta))
+        force = self.forces.at(*_values_at(self.physics, theta))
         for name, (column, nominal) in self.linear.items():
             if theta.get(name, nominal) != nominal:
                 force += (theta[name] - nominal) * column
         return self.motion.defect(force)
 
-    def slopes(
-        self, theta: Theta, names: Sequence[str], runs: Collection[int] | None = None
-    ) -> Iterator[Array]:
+    def slopes(self, theta: Theta, names: Sequence[str]) -> Iterator[Array]:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
-        slopes = self.forces.slopes(*values_at(self.physics, theta)) if names else np.empty(0)
+        slopes = self.forces.slopes(*_values_at(self.physics, theta)) if names else np.empty(0)
         place = {n: i for i, n in enumerate(self.physics.names)}
         for part in at_once(len(names)):
             forces = (
@@ -118,7 +113,7 @@ class LinearisedState:
                 for n in names[part]
             )
             g = np.stack([self.motion.response(f) for f in forces], axis=-1)
-            yield from self.pick(self.pushed(g), runs).T
+            yield from self.pick(self.pushed(g)).T
 
     def pushed(self, g: Array) -> Array:
         """Whitened residuals (n, L, m, c) that accelerations g (n, L, k, c) make."""
@@ -135,12 +130,10 @@ class LinearisedState:
         g = np.stack([self.acceleration(t) for t in thetas], axis=-1)
         return self.whitened(y, g)
 
-    def each_residual(
-        self, thetas: Sequence[Theta], runs: Collection[int] | None = None
-    ) -> Iterator[Array]:
+    def each_residual(self, thetas: Sequence[Theta]) -> Iterator[Array]:
         """Whitened residuals (rows,) at each theta in turn."""
         for part in at_once(len(thetas)):
-            yield from self.pick(self.residuals(thetas[part]), runs).T
+            yield from self.pick(self.residuals(thetas[part])).T
 
     def with_noise(self, noise: Noise) -> LinearisedState:
         """The same logs and motion, filtered with this noise of the sensors."""
@@ -160,10 +153,10 @@ class LinearisedState:
             whole[i], done = part.T, done + int(own.sum())
         return np.asarray(whole.swapaxes(0, 1))
 
-    def pick(self, columns: Array, runs: Collection[int] | None = None) -> Array:
+    def pick(self, columns: Array) -> Array:
         """(n, L, m, ...) -> rows (rows, ...): run by run, channel by channel, in time."""
-        chosen = range(len(self.batch.resampled)) if runs is None else runs
-        return np.concatenate([columns[:, i].swapaxes(0, 1)[self.mask[:, i].T] for i in chosen])
+        runs = range(len(self.batch.resampled))
+        return np.concatenate([columns[:, i].swapaxes(0, 1)[self.mask[:, i].T] for i in runs])
 
 
 def linearise_at(
@@ -181,7 +174,7 @@ def linearise_at(
     `unknown`: density of the forces that no model explains; `noise` of the sensors; `first`: the
     motion smoothed without the model's forces, where it is known.
     """
-    p = values_at(physics, base)[0]
+    p = _values_at(physics, base)[0]
     dt = float(np.median(batch.h[batch.valid]))
     late = np.array([sensors.lateness(base, channel) for channel in physics.channels])
     rows = whole_rows(late, dt)
@@ -190,7 +183,7 @@ def linearise_at(
         first = first_reference(physics, batch, p)
     reference = _without_delays(batch, late - rows * dt, first)
     schedules = read_schedules(physics, batch, reference, p)
-    for _ in range(StateSettings.rounds):
+    for _ in range(ROUNDS):
         state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
@@ -223,12 +216,12 @@ def _along(
     noise: Noise,
 ) -> LinearisedState:
     """The model at `base` linearised along one reference."""
-    p, delays = values_at(physics, base)
+    p, delays = _values_at(physics, base)
     states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
     density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
     mask = np.isfinite(motion.system.R)
-    mask[: StateSettings.lead_in] = False
+    mask[:LEAD_IN] = False
     forces = Forces(physics, batch, motion)
     gain = gains(motion.system)
     return LinearisedState(
@@ -236,7 +229,7 @@ def _along(
     )
 
 
-def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
+def _values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     """Free parameters (k,) in the order of `physics.names`, and delays (valves, 2) [s] to switching
     on and off, at theta."""
     names = zip(physics.names, physics.nominal, strict=True)
@@ -244,3 +237,25 @@ def values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
     p = np.clip(p, *physics.bounds)
     late = [physics.base.timing(leg, theta) for leg in physics.legs]
     return p, np.repeat(late, 2, axis=0)  # both valves of a leg
+
+
+def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
+    """The noise of each channel, learnt from the rows `left` (rows,) that a flexible model leaves;
+    as stated where a correlation time is stated. `drifts`: slow drifts are looked for, too."""
+    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings
+    k = motion.ref.q.shape[2]
+    pushed = motion.inverse @ motion.channels[..., :k]
+    most = np.where(batch.stated, settings.stated, settings.guessed)
+    found = learnt_noise(
+        motion.system,
+        state.gain,
+        state.spread(left),
+        batch.sigma,
+        batch.h,
+        [pushed[..., i] for i in range(k)],
+        most,
+        drifts,
+    )
+    stated = stated_noise(batch)
+    known = np.isfinite(batch.memory)
+    return tuple(s if on else f for s, f, on in zip(stated, found, known, strict=True))

@@ -12,9 +12,9 @@ from twin import catalogue, measure
 
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
-from kemba.identify.evidence.colour import DriftSettings, log_likelihood, with_learnt_colour
+from kemba.identify.infer.colour import DriftSettings, log_likelihood, with_learnt_colour
 from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.identify.robot.motion.colour import coloured, simulated
+from kemba.identify.robot.noise import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

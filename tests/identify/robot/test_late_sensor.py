@@ -12,9 +12,9 @@ pytest.importorskip("numba")
 from twin.cases import robot_case
 
 from kemba.identify.discover import Discovery, discover
-from kemba.identify.doubt.held_out import HeldOut
-from kemba.identify.evidence.spike_slab import NULL
-from kemba.identify.evidence.windows import error_ratio
+from kemba.identify.infer.cross_validation import HeldOut
+from kemba.identify.infer.spike_slab import NULL
+from kemba.identify.infer.windows import error_ratio
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
@@ -70,7 +70,7 @@ def test_the_model_as_it_is_is_judged_along_its_own_motion(
 ) -> None:
     """Along that of the answer it would look twice as bad as `compare` says."""
     search = found.search
-    own = error_ratio(problem(logs[:3]).heard_as(search.problem), {})
+    own = error_ratio(problem(logs[:3]).with_noise_of(search.problem), {})
     assert found.fitted[0] == pytest.approx(own, rel=0.2)
     assert search.points[NULL].fitted_error > 1.5 * own
 

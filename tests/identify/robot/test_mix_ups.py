@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.identify.robot.dynamics.physics import Array, Physics
+from kemba.identify.problem.types import Array
+from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.mix_ups import mix_ups, mixed_up
-from kemba.identify.robot.motion.resampled import ResampledLog
+from kemba.identify.robot.physics import Physics
 from kemba.model.spec import load_model
 
 Change = Callable[[Array], Array]

@@ -13,7 +13,7 @@ pytest.importorskip("numba")
 import kemba
 from kemba.identify.discover import discover
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.robot.motion.contact import steady_while
+from kemba.identify.robot.contact import steady_while
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 

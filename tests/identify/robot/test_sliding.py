@@ -9,7 +9,7 @@ pytest.importorskip("numba")
 
 from twin import catalogue, measure, repertoire, run
 
-from kemba.identify.robot.motion.contact import ContactSchedule, read_schedule
+from kemba.identify.robot.contact import ContactSchedule, read_schedule
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

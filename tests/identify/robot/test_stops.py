@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from kemba.identify.robot.motion.contact import read_schedule
+from kemba.identify.robot.contact import read_schedule
 
 STROKE, DT = 0.06, 1e-3  # m, s
 

@@ -1,1 +1,0 @@
-"""Which effects explain the data: linearised evidence, refits, search, bootstrap."""

@@ -1,0 +1,80 @@
+"""The colour of the noise, learnt from what is left when every effect may help to explain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kemba.identify.infer.linear import Linear, is_on, linearise, time_blocks
+from kemba.identify.infer.mode import mode_of
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.sensor_faults import moves_readings
+from kemba.identify.problem.types import Array, Labels, Theta
+
+
+class DriftSettings:
+    """When the sensors are taken to drift."""
+
+    strong = 3.0  # evidence from which sensors drift [nats]: Kass and Raftery 1995, twenty to one
+
+
+def with_learnt_colour(
+    problem: Problem, theta: Theta, blocks: Labels | None = None, careful: bool = False
+) -> Problem:
+    """The problem under the noise colour of a flexible model's residual about `theta`.
+
+    A residual of the model under test would not do: a missing effect would pass for coloured
+    noise. `careful`: the model at theta is good; see `Problem.recolour`.
+    """
+    if not problem.learns_colour:
+        return problem
+    found = learnt_colour(problem, theta, blocks, careful)[0]
+    blamed = any(moves_readings(n) for n in theta if n not in problem.nuisance)
+    return _with_drift(found, theta) if careful and (blamed or not problem.moves) else found
+
+
+def _with_drift(problem: Problem, theta: Theta) -> Problem:
+    """The problem with drifting sensors, where the logs are clearly likelier so.
+
+    A wrong sensor or length explains some of a drift, and so does friction. The drift itself
+    explains more of it. Where the motion moves it is asked for only where a sensor or a length is
+    wrong at theta: there the question takes seconds.
+    """
+    drifting = problem.drifting()
+    if drifting is None:
+        return problem
+    gain = log_likelihood(drifting, theta) - log_likelihood(problem, theta)
+    return drifting if gain > DriftSettings.strong else problem
+
+
+def log_likelihood(problem: Problem, theta: Theta) -> float:
+    """Log likelihood [nats] of the logs, up to a constant, all effects free within their priors."""
+    linear, _, _ = linearise(problem, theta, time_blocks(problem))
+    gram, slope, power = linear.total
+    best = best_fit(linear)
+    step, off = best - linear.at, (best - linear.mean) / linear.width
+    h = gram * np.outer(linear.width, linear.width) + np.eye(len(off))
+    squares = power + 2.0 * slope @ step + step @ gram @ step + off @ off
+    return problem.log_density() - 0.5 * float(squares + np.linalg.slogdet(h)[1])
+
+
+def learnt_colour(
+    problem: Problem, theta: Theta, blocks: Labels | None, careful: bool
+) -> tuple[Problem, Array]:
+    """The same, and the Jacobian (n, k) at theta of the problem without colour."""
+    plain = problem.recolour(None)
+    blocks = time_blocks(plain) if blocks is None else blocks
+    linear, jacobian, _ = linearise(plain, theta, blocks)
+    on = tuple(n for n, c in plain.candidates.items() if is_on(theta, c.key, c.lead))
+    mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
+    left = mode.residual + jacobian @ (best_fit(mode.linear) - mode.linear.at)
+    return plain.recolour(left, careful=careful), jacobian
+
+
+def best_fit(linear: Linear) -> Array:
+    """z (k,) of the best fit, every parameter free within its prior."""
+    gram, slope, _ = linear.total
+    precision = 1.0 / linear.width**2
+    shift = linear.mean - linear.at
+    h = (gram + np.diag(precision)) * np.outer(linear.width, linear.width)
+    eta = linear.width * (precision * shift - slope)
+    return linear.at + linear.width * np.linalg.solve(h, eta)

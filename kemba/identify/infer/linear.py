@@ -1,0 +1,223 @@
+"""A problem linearised at one point: sums over rows, from which all rankings are K x K algebra."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import sparse
+
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Array, Candidate, Flags, Labels, Parameter, Theta
+
+
+class LinearSettings:
+    """Where the linearised problem may lead."""
+
+    farthest = 4.0  # largest distance of a switch from off, in sizes, where it is tried
+    widths = 8.0  # largest distance of a nominal figure from its prior mean, in sigmas
+    blocks = 4  # fewest blocks: fewer runs are cut in time: for leaving out a quarter
+    pieces = 4  # pieces of a run that are told apart: quarters
+
+
+@dataclass(frozen=True)
+class Linear:
+    """r(z) = r0 + J (z - at), as sums over b blocks of rows.
+
+    `names` of the k parameters; `at` (k,): where it is linearised; shapes stand as logarithms.
+    `mean` and `width` (k,): the prior of each parameter when it is free. `gram` (b, k, k) = J'J,
+    `slope` (b, k) = J'r0, `power` (b,) = r0'r0, `count` (b,): rows per block.
+    """
+
+    names: tuple[str, ...]
+    at: Array
+    mean: Array
+    width: Array
+    gram: Array
+    slope: Array
+    power: Array
+    count: Array
+
+    @property
+    def total(self) -> tuple[Array, Array, float]:
+        """J'J (k, k), J'r0 (k,) and r0'r0 over all blocks."""
+        return self.gram.sum(axis=0), self.slope.sum(axis=0), float(self.power.sum())
+
+    def without(self, blocks: Flags) -> Linear:
+        """The same with the blocks where `blocks` (b,) is true left out."""
+        return self.only(~blocks)
+
+    def only(self, keep: Flags) -> Linear:
+        """The same with the blocks where `keep` (b,) is true."""
+        return replace(
+            self,
+            gram=self.gram[keep],
+            slope=self.slope[keep],
+            power=self.power[keep],
+            count=self.count[keep],
+        )
+
+    def index(self, name: str) -> int:
+        """Place of a name. Raises ValueError where it is none of `names`."""
+        return self.names.index(name)
+
+
+def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
+    """Nuisance, every switch, and the shapes of the effects that are on."""
+    shapes = [
+        key
+        for c in problem.candidates.values()
+        if is_on(theta, c.key, c.lead)
+        for key in tuple(c.keys())
+        if key != c.key
+    ]
+    return (*problem.nuisance, *(c.key for c in problem.candidates.values()), *shapes)
+
+
+def is_on(theta: Theta, key: str, lead: Parameter) -> bool:
+    """Whether theta switches the effect on whose switch is `lead`, named `key`."""
+    return theta.get(key, lead.off) != lead.off
+
+
+def linearise(
+    problem: Problem, theta: Theta, blocks: Labels, names: Iterable[str] | None = None
+) -> tuple[Linear, Array, Array]:
+    """The problem at theta, with J (n, k) and the residual (n,); `blocks` (n,) labels the rows."""
+    names = names_of(problem, theta) if names is None else tuple(names)
+    r, jacobian = problem.residual(theta), _slopes_at(problem, theta, names)
+    at, mean, width = priors(problem, theta, names)
+    return condense(names, at, mean, width, jacobian, r, blocks), jacobian, r
+
+
+def _slopes_at(problem: Problem, theta: Theta, names: Iterable[str]) -> Array:
+    """J (n, k) at theta, along the logarithm of every shape."""
+    names = tuple(names)
+    jacobian = problem.jacobian(theta, names)
+    for i, name in enumerate(names):
+        if is_shape(problem, name):
+            jacobian[:, i] *= theta[name]
+    return jacobian
+
+
+def condense(
+    names: tuple[str, ...],
+    at: Array,
+    mean: Array,
+    width: Array,
+    jacobian: Array,
+    r: Array,
+    blocks: Labels,
+) -> Linear:
+    """Sums over each block: `jacobian` (n, k), `r` (n,), `blocks` (n,) labels of the rows; `at`,
+    `mean` and `width` (k,) as in `Linear`."""
+    labels = np.unique(blocks)
+    gram, slope, power, count = [], [], [], []
+    for label in labels:
+        rows = blocks == label
+        j, e = jacobian[rows], r[rows]
+        gram.append(j.T @ j)
+        slope.append(j.T @ e)
+        power.append(float(e @ e))
+        count.append(int(rows.sum()))
+    arrays = (np.array(a) for a in (gram, slope, power, count))
+    return Linear(tuple(names), at, mean, width, *arrays)
+
+
+def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) -> Linear:
+    """The same slopes about another point, where the residual is r (n,)."""
+    places = np.searchsorted(np.unique(blocks), blocks), np.arange(len(r))
+    by_block = sparse.csr_array((r, places))  # quicker than parts of J, which would be copied
+    return replace(linear, at=at, slope=by_block @ jacobian, power=by_block @ r)
+
+
+def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:
+    """Theta with every effect's parameters inside their bounds."""
+    bounds = {k: p for c in candidates.values() for k, p in c.keys().items()}
+    clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
+    return usual_shapes(candidates, clipped) | clipped
+
+
+def usual_shapes(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:
+    """The usual shapes of the effects that theta switches on."""
+    return {
+        key: p.typical
+        for c in candidates.values()
+        if is_on(theta, c.key, c.lead)
+        for key, p in c.keys().items()
+        if key != c.key
+    }
+
+
+def _sane(value: float, parameter: Parameter) -> float:
+    """Within the bounds, and within a few sizes of off where it is a switch."""
+    if np.isnan(parameter.typical):
+        reach = LinearSettings.farthest * parameter.size
+        value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
+    return float(np.clip(value, parameter.lower, parameter.upper))
+
+
+def is_shape(problem: Problem, name: str) -> bool:
+    """Whether a name in theta is a shape parameter of an effect."""
+    effect = name.rsplit(".", 1)[0]
+    candidate = problem.candidates.get(effect)
+    return candidate is not None and name != candidate.key
+
+
+def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array, Array, Array]:
+    """Value at theta, prior mean and prior width (k,) of each name; shapes as logarithms."""
+    rows = []
+    for name in names:
+        if name in problem.nuisance:
+            nominal, sigma = problem.nuisance[name]
+            rows.append((theta.get(name, nominal), nominal, sigma))
+            continue
+        parameter = problem.candidates[name.rsplit(".", 1)[0]].keys()[name]
+        if is_shape(problem, name):
+            usual = parameter.typical  # also of an effect that is absent
+            rows.append((np.log(theta.get(name, usual)), np.log(usual), parameter.size))
+        else:
+            rows.append((theta.get(name, parameter.off), parameter.off, parameter.size))
+    at, mean, width = np.array(rows).T
+    return at, mean, width
+
+
+def time_blocks(problem: Problem, wanted: int | None = None, shortest: float = 0.0) -> Labels:
+    """A label (n,) per row: every run is a block, cut in time where there are fewer runs than
+    `wanted` (None: the setting), or cut into pieces of at least `shortest` [s]."""
+    wanted = LinearSettings.blocks if wanted is None else wanted
+    rows = problem.rows()
+    pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
+    labels = np.zeros(len(rows), dtype=int)
+    for i in range(len(problem.runs)):
+        own = rows.run == i
+        t = rows.time[own]
+        span = max(float(np.ptp(t)), 1e-9)
+        k = max(1, int(span / shortest)) if shortest else pieces
+        labels[own] = i * 100000 + np.minimum((t - t.min()) / span * k, k - 1).astype(int)
+    return np.unique(labels, return_inverse=True)[1]
+
+
+def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
+    """Theta of a vector z (k,); effects whose switch is off are left out.
+
+    Nominal figures stay within their reach: a log that is wrong may ask for a negative rise time.
+    """
+    theta: dict[str, float] = {}
+    widths = LinearSettings.widths
+    for name, value in zip(linear.names, z, strict=True):
+        theta[name] = float(np.exp(value)) if is_shape(problem, name) else float(value)
+        if name in problem.nuisance:
+            nominal, sigma = problem.nuisance[name]
+            theta[name] = float(np.clip(value, nominal - widths * sigma, nominal + widths * sigma))
+    return _clean(problem, theta)
+
+
+def _clean(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
+    off = {
+        key
+        for c in problem.candidates.values()
+        if not is_on(theta, c.key, c.lead)
+        for key in tuple(c.keys())
+    }
+    return {k: v for k, v in theta.items() if k not in off}

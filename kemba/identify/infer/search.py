@@ -1,0 +1,283 @@
+"""The search: fit of the null, ranking, refits of the leaders, further effects one by one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kemba.identify.infer.colour import with_learnt_colour
+from kemba.identify.infer.linear import estimate, names_of
+from kemba.identify.infer.null_model import Baseline, LinearisationPoint
+from kemba.identify.infer.refit import Fit, Frozen, refit
+from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior, probabilities
+from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.types import Theta
+from kemba.stopwatch import Stage
+
+
+class SearchSettings:
+    """Which hypotheses are refitted."""
+
+    leaders = 6  # effects that are refitted in a round
+    sure = 3  # leaders that are refitted however far behind they are
+    sure_grown = 2  # the same beside effects that are found already
+    far = 40.0  # other leaders are refitted when not farther behind [nats]
+    # error of the model as it is, in noise units, from which another structure is refitted whatever
+    # its linear evidence is
+    structural = 1.3
+    far_share = 0.7  # or no farther behind than this share of the gain
+    promising = 0.5  # share of the best gain with which an effect is tried again
+    followed = 2  # times that the motion is found again with the best guess
+    # times that the motion is found before a search along it, until late sensors stay as late: a
+    # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
+    # second one after it
+    settled = 4
+    still = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
+    largest = 10  # effects in one answer: more than any machine is expected to lack
+    regrown = 3  # times that an answer of several effects is begun again where it has led
+    swapped = 2  # rounds in which effects of an answer are taken away or swapped
+    leaders_grown = 3  # effects that are refitted beside the best answer
+    leaders_swapped = 2  # effects that are refitted in place of one of the answer
+
+
+@dataclass
+class Search:
+    """The null model, and every hypothesis that was refitted beside it; `run` fills it.
+
+    `problem`: the problem as it is now; it is replaced when its noise colour is learnt or its
+    motion found again. `deadline`: when to stop searching, `due`: when the answer is due, by
+    `time.monotonic` [s]. `say`: told of progress. `points`: every hypothesis that was refitted.
+    `begin`: figures of the model as it is, where a fit found them already. `base`: the null model.
+    `in_pieces`: the error that is told is of quarters of runs left out, and not of whole runs.
+    `own`: the problem and theta of the model as it is, along the motion that it makes of the data
+    itself, where late sensors have led to a motion along which it cannot be judged.
+    """
+
+    problem: Problem
+    deadline: float = np.inf
+    say: Callable[[str], None] = lambda text: None
+    points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
+    begin: Mapping[str, float] = field(default_factory=dict)
+    due: float = np.inf
+    in_pieces: bool = False
+    own: tuple[Problem, Theta] | None = None
+    base: Baseline = field(init=False)
+    _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the time is over. A first effect is refitted all the same."""
+        return time.monotonic() > self.deadline
+
+    @property
+    def late(self) -> bool:
+        """Whether the answer is due: nothing more is refitted to doubt it."""
+        return time.monotonic() > self.due
+
+    def run(self) -> Hypothesis:
+        """The likeliest hypothesis; everything that was refitted stays in `points`."""
+        return self.further(self.first())
+
+    def first(self) -> Hypothesis:
+        """The first guess: the best of the single effects that look best."""
+        self.say("fitting the model as it is, and a slope for every effect")
+        self.start()
+        best = self._round(NULL, SearchSettings.leaders)
+        self.say(f"first guess: {' + '.join(best) or 'nothing'}")
+        return best
+
+    def further(self, best: Hypothesis) -> Hypothesis:
+        """The likeliest hypothesis, searched for from the first guess."""
+        if self.problem.moves:
+            return self._follow(best)
+        if best != NULL:
+            promising = self._promising()
+            self.base.seen_from(self.points[best].fit.theta)
+            self.problem = self.base.problem
+            self.points = {NULL: self.base.point}
+            for number, hypothesis in enumerate(promising, start=1):
+                self.visit(hypothesis, number, len(promising))
+            best = self._round(NULL, SearchSettings.leaders)
+        return self._swap(self._grow(best)) if best else best
+
+    def _follow(self, best: Hypothesis) -> Hypothesis:
+        """Repeat the search along the motion that the best hypothesis makes of the data, until the
+        best hypothesis stays the same."""
+        for _ in range(SearchSettings.followed):
+            if best == NULL or self.ended:
+                return best
+            before, best = best, self._along(best)
+            if best == before:
+                break
+        return self._swap(self._regrow(self._grow(best))) if best else best
+
+    def _along(self, guess: Hypothesis) -> Hypothesis:
+        """The best single effect along the motion that a guess makes of the data."""
+        self.say(f"searching again with {' + '.join(guess)} in the model")
+        self.start(self._settle(guess))
+        self.visit(guess)
+        return self._round(NULL, SearchSettings.leaders)
+
+    def _regrow(self, best: Hypothesis) -> Hypothesis:
+        """Find the motion again with an answer of several effects, and let it grow from there.
+
+        Each effect that joins changes the motion, and with it what the others seem to be.
+        """
+        for _ in range(SearchSettings.regrown):
+            if len(best) < 2 or self.ended:
+                break
+            before = best
+            self.say(f"searching again with {' + '.join(best)} in the model")
+            self.start(self._settle(best))
+            self.visit(best)
+            best = self._grow(best)
+            if best == before:
+                break
+        return best
+
+    def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
+        """Find the motion that a hypothesis makes of the data, until late sensors stay as late; the
+        best theta there."""
+        settings, theta = SearchSettings, self.points[hypothesis].fit.theta
+        asked = self.problem
+        for _ in range(settings.settled):
+            self.problem = self.problem.relinearise(theta)
+            late = self.problem.held_back(theta)
+            if not late or self.ended:
+                break
+            self.own = self.own or (asked, self.points[NULL].fit.theta)
+            figures, before = tuple(self.problem.nuisance), theta
+            slopes = Frozen(figures, self.problem.jacobian(theta, figures))
+            theta = refit(self.problem, hypothesis, theta, slopes).theta
+            self._thetas[hypothesis] = dict(theta)
+            moved = max(abs(theta[name] - before[name]) for name in late)
+            if moved < settings.still * self.problem.interval:
+                break
+        return theta
+
+    def start(self, theta: Mapping[str, float] | None = None) -> None:
+        """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
+        if self.problem.moves:
+            about = theta or self.begin
+            self.problem = with_learnt_colour(self.problem, about, careful=bool(theta))
+        self.base = Baseline(self.problem, theta or self.begin)
+        self.problem = self.base.problem
+        self.points = {NULL: self.base.point}
+
+    def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
+        """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
+        or more; the best of all points so far."""
+        self._refit_leaders(given, leaders, least)
+        if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
+            for structure in sorted(self.problem.structures):
+                self.visit((structure,))
+        return self.best()
+
+    def _refit_leaders(self, given: Hypothesis, leaders: int, least: float) -> None:
+        settings = SearchSettings
+        table = self._extensions(given)
+        order = sorted(table, key=lambda h: -table[h])[:leaders]
+        gain = table[order[0]] - self.points[given].log_evidence
+        reach = max(settings.far, settings.far_share * gain)
+        sure = settings.sure_grown if given else settings.sure
+        for number, hypothesis in enumerate(order, start=1):
+            if table[hypothesis] < least:
+                break
+            if given and table[hypothesis] < self.points[given].log_evidence:
+                break  # even the linear evidence gains nothing
+            if table[hypothesis] < table[order[0]] - reach and hypothesis not in order[:sure]:
+                break
+            if self.ended and (given or number > 1):
+                break
+            self.visit(hypothesis, number, len(order))
+
+    def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
+        """Linear evidence of `given` plus one effect."""
+        if given == NULL:
+            return self.base.table
+        return self.base.ranker(self.points[given].mode.linear).table(given)
+
+    def _grow(self, best: Hypothesis) -> Hypothesis:
+        """Add effects, one by one, while the evidence grows."""
+        settings = SearchSettings
+        while len(best) < settings.largest and not self.ended:
+            grown = self._round(best, settings.leaders_grown)
+            if grown == best or len(grown) <= len(best):
+                break
+            best = grown
+        return best
+
+    def _swap(self, best: Hypothesis) -> Hypothesis:
+        """Take each effect away, or swap it for another; what was swapped may grow again."""
+        settings = SearchSettings
+        for _ in range(settings.swapped):
+            before = best
+            for member in best if len(best) > 1 else ():
+                if self.ended:
+                    return self.best()
+                rest = tuple(h for h in best if h != member)
+                self.visit(rest)
+                least = self.points[best].log_evidence - settings.far
+                self._round(rest, settings.leaders_swapped, least)
+            best = self.best()
+            if best == before or self.ended:
+                break
+            best = self._grow(best)
+        return best
+
+    def _promising(self) -> list[Hypothesis]:
+        """Refitted hypotheses that gained a good share of what the best one gained."""
+        null = self.points[NULL].log_evidence
+        gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
+        least = SearchSettings.promising * max(gains.values())
+        return [h for h, gain in gains.items() if gain > least]
+
+    def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
+        """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
+        if hypothesis not in self.points:
+            name = f"refitting {' + '.join(hypothesis)}"
+            self.say(Stage(name, number, of) if of > 1 else name)
+            fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
+            self.points[hypothesis] = self._point(hypothesis, fit)
+            self._thetas[hypothesis] = fit.theta
+        return self.points[hypothesis]
+
+    def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
+        """The problem about a refitted point: slopes of its own parameters are those of the fit,
+        all others are the null's."""
+        names, base = names_of(self.problem, fit.theta), self.base
+        known = {n: i for i, n in enumerate(base.point.linear.names)}
+        own = {i: fit.columns[n] for i, n in enumerate(names) if n in fit.columns}
+        at = [0 if i in own else known[n] for i, n in enumerate(names)]
+        slopes = np.take(base.jacobian, at, axis=1)
+        for i, column in own.items():
+            slopes[:, i] = column
+        return base.judged(hypothesis, fit, names, slopes)
+
+    def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
+        """Where a refit starts: at its last result, or at the linear estimate from the largest part
+        of the hypothesis that was refitted."""
+        if hypothesis in self._thetas:
+            return self._thetas[hypothesis]
+        parts = [h for h in self.points if set(h) < set(hypothesis)]
+        part = max(parts, key=lambda h: (len(h), self.points[h].log_evidence))
+        point = self.points[part]
+        linear = point.mode.linear
+        z = self.base.ranker(linear).score(hypothesis).z
+        guess = estimate(self.problem, linear, z)
+        return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
+
+    def best(self) -> Hypothesis:
+        """The likeliest of all refitted hypotheses."""
+        count = len(self.problem.candidates)
+        return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
+
+    def probabilities(self, dismissed: Collection[Hypothesis] = ()) -> dict[Hypothesis, float]:
+        """Of all refitted hypotheses, and of the other single effects by their linear evidence;
+        without the hypotheses `dismissed` as too small or as refuted by left-out data."""
+        evidence = self.base.table | {h: p.log_evidence for h, p in self.points.items()}
+        evidence = {h: e for h, e in evidence.items() if h not in dismissed}
+        return probabilities(evidence, len(self.problem.candidates))

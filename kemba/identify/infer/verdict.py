@@ -1,0 +1,92 @@
+"""What may be said of a finished search: why its answer is not complete, and the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kemba.errors import enumerated
+from kemba.identify.answer import ENDED, Ranked, Verdict, VerdictSettings
+from kemba.identify.infer.cross_validation import HeldOut, error
+from kemba.identify.infer.formula import Formula
+from kemba.identify.infer.residual import Drift, pattern_left, unfinished
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import Selection
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.windows import excess
+from kemba.identify.problem.sensor_faults import is_fault
+
+
+@dataclass(frozen=True)
+class Caveats:
+    """Why an answer is not complete. `part`: it explains enough of the error to be a part;
+    `unsure`: effects of it that are likely at best, whatever their probability."""
+
+    reasons: tuple[str, ...] = ()
+    part: bool = False
+    unsure: Hypothesis = ()
+
+
+def caveats_of(
+    search: Search,
+    selection: Selection,
+    drift: Drift | None,
+    kept: HeldOut | None,
+    ended: bool = False,
+) -> Caveats:
+    """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
+    was over before the search was."""
+    settings, reasons, best = VerdictSettings, [], selection.best
+    before, after = (error(search, h, kept) for h in (NULL, best))
+    least = settings.part
+    if drift is not None:
+        reasons.append(str(drift))
+        least = settings.part_of_structure
+    elif unfinished(search, best):
+        reasons.append("the error that is left repeats itself with motion and valves")
+        least = settings.part_of_structure
+    elif pattern := pattern_left(search, best):
+        reasons.append(f"the error that is left has a pattern: {pattern}")
+        least = settings.part_of_structure
+    if drift is None and after <= settings.whole:
+        least = settings.part  # a whole answer may leave as much
+    if ended and after > settings.whole:
+        reasons.append(ENDED)
+        least = 0.0  # however little it explains, nothing else could be asked
+    if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
+        reasons.append(
+            f"{enumerated(best)} fits best, but leaves an error of {after:.3g} times the noise"
+        )
+    if not best and selection.p_value <= settings.unexplained and before > settings.whole:
+        reasons.append(
+            f"the model as it is leaves an error of {before:.3g} times the noise, and no effect "
+            "explains enough of it"
+        )
+    if selection.rivals:
+        others = ", ".join(" + ".join(h) for h in selection.rivals)
+        reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
+    part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
+    unsure = _unasked(search, best) if ended else ()
+    if unsure and not reasons:
+        return Caveats((ENDED,), part=True, unsure=unsure)
+    return Caveats(tuple(reasons), part, unsure)
+
+
+def _unasked(search: Search, best: Hypothesis) -> Hypothesis:
+    """Effects of an ended search's answer that nothing else was asked for: smaller answers, and
+    sensors that drift instead of being wrong, come last."""
+    asked_smaller = len(best) == 1 or not search.late
+    return tuple(e for e in best if is_fault(e)) if asked_smaller else best
+
+
+def verdict_on(best: Hypothesis, formula: Formula | None, caveats: Caveats) -> Verdict:
+    """Missing, where the answer is complete; partly, where it explains enough of the error."""
+    if formula is not None or (caveats.reasons and not caveats.part):
+        return "unknown"
+    if not best:
+        return "nothing"
+    return "partly" if caveats.reasons else "missing"
+
+
+def is_sure(ranked: Ranked) -> bool:
+    """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
+    return ranked.probability >= VerdictSettings.sure and not ranked.equivalent_to

@@ -1,0 +1,170 @@
+"""The force that a rig's logs should show, with effects switched on and sensors as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+
+from kemba.effects.series import Series
+from kemba.identify.problem.candidates import CompiledModels, nominal_figures
+from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
+from kemba.identify.problem.types import Array, Candidate, Theta
+from kemba.identify.rigs.rig_log import ANSWER, PLACE, Filtered, RigLog
+from kemba.model.exponential import midpoint_step
+from kemba.model.model import Model
+from kemba.model.rest import Rest, rate_of
+
+CHUNK = 1000  # steps per call of a compiled function
+
+
+class Balance:
+    """A model with numbers left free: `free` parameters, `scaled` figures.
+
+    The force is what the measured motion and the measured inputs demand. A cylinder: the force on
+    the rod. A drive: the measured force of the motor, plus what the balance of forces lacks.
+    """
+
+    def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
+        self.model, self.names = model, (*free, *scaled)
+        node = model.build(free, scaled)
+        self.inputs = [q.name for q in model.inputs.values()]
+        drive = model.mechanism.rig == "drive"
+        force = node.dynamics[0] + node.u[0] if drive else node.outputs["piston/F"]
+        symbols = [node.s, node.q, node.v, node.a, node.u, node.p]
+        slopes = ca.horzcat(ca.jacobian(force, node.a), ca.jacobian(force, node.u))
+        self._force = ca.Function("force", symbols, [ca.densify(force)])
+        self._slopes = ca.Function("slopes", symbols, [ca.densify(slopes.T)])
+        at_rest = ca.substitute(force, ca.vertcat(node.v, node.a), ca.DM.zeros(2))
+        bends = ca.which_depends(at_rest, node.q, 2, True)[0]
+        self._bends = bool(bends)
+        self._static = ca.Function("static", symbols, [ca.densify(at_rest)])
+        self._states = len(model.states)
+        if self._states:
+            rate = rate_of(node)
+            self._rest = Rest(node.s, symbols[1:], rate, list(model.states.values()))
+            given = ca.SX.sym("given", 4 + node.u.numel())
+            at = [given[1], given[2], given[3], given[4:], node.p]
+            after, _ = midpoint_step(rate, node.s, symbols[1:], at, given[0])
+            step = ca.Function("step", [node.s, given, node.p], [ca.densify(after)])
+            self._chunk = CHUNK
+            self._step = step.mapaccum(self._chunk)
+
+    def force(self, log: Filtered, values: Mapping[str, float]) -> Array:
+        """Force (k,) at the judged rows; `values` holds every name of `names`."""
+        found = np.asarray(self._force(*self._arguments(log, values))).ravel()
+        return found + self._bent(log, values) if self._bends else found
+
+    def slopes(self, log: Filtered, values: Mapping[str, float]) -> Array:
+        """Slopes (k, 1 + inputs) of the force: by the acceleration and by each input."""
+        found: Array = np.asarray(self._slopes(*self._arguments(log, values)))
+        return np.asarray(found.T)
+
+    def _bent(self, log: Filtered, values: Mapping[str, float]) -> Array:
+        """What the force (k,) of the position is more behind the filter than at the position that
+        is behind it."""
+        p = np.array([values[name] for name in self.names]).reshape(-1, 1)
+        u = np.stack([log.others[name] for name in self.inputs])
+        rest = np.zeros((1, len(log.q)))
+        s, fixed = np.zeros((self._states, len(log.q))), np.repeat(p, len(log.q), axis=1)
+        read, behind = (
+            np.asarray(self._static(s, q[None], rest, rest, u, fixed)).ravel()
+            for q in (log.read, log.q)
+        )
+        return np.asarray((log.smoothed(read) - behind)[log.rows])
+
+    def _arguments(self, log: Filtered, values: Mapping[str, float]) -> list[Array]:
+        p = np.array([values[name] for name in self.names]).reshape(-1, 1)
+        u = np.stack([log.others[name] for name in self.inputs])
+        rows = log.rows
+        s = self._along(log, u, p)[:, rows] if self._states else np.zeros((0, len(rows)))
+        fixed = np.repeat(p, len(rows), axis=1)
+        return [s, *(c[None, rows] for c in (log.q, log.v, log.a)), u[:, rows], fixed]
+
+    def _along(self, log: Filtered, u: Array, p: Array) -> Array:
+        """States (ns, n) along the whole log; each stretch begins at rest."""
+        ends = np.append(log.begins[1:], len(log.time))
+        parts = []
+        for begin, end in zip(log.begins, ends, strict=True):
+            own = slice(begin, end)
+            s = self._rest(log.q[begin], 0.0, 0.0, u[:, begin], p)[:, None]
+            middle = [0.5 * (c[own][1:] + c[own][:-1]) for c in (log.q, log.v, log.a, *u)]
+            given = np.stack([np.diff(log.time[own]), *middle])
+            count = given.shape[1]
+            given = np.pad(given, ((0, 0), (0, -count % self._chunk)))  # steps of no length
+            fixed = np.repeat(p, self._chunk, axis=1)
+            found = [s]
+            for i in range(0, given.shape[1], self._chunk):
+                block = given[:, i : i + self._chunk]
+                found.append(np.asarray(self._step(found[-1][:, -1:], block, fixed)))
+            parts.append(np.concatenate(found, axis=1)[:, : count + 1])
+        return np.concatenate(parts, axis=1)
+
+
+SEALS = "measured_chambers.travel"
+TRAVEL = 0.5  # prior sigma of the travel until they slide, as a share of it
+LEAST = 0.05  # smallest force of a motor over that of the log
+
+
+class Predictor(CompiledModels[Balance]):
+    """Balances of one model, and what its sensors make of them."""
+
+    def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
+        super().__init__(model, candidates, nominal_figures(model), Balance)
+        rig = model.mechanism.rig
+        self.place, self.answer = PLACE[rig], ANSWER[rig]
+        if rig == "cylinder":
+            self.figures[SEALS] = (1.0, TRAVEL)
+        self.sensors = SensorFaults(model.effects)
+
+    def gap(self, log: RigLog, theta: Theta) -> Array:
+        """Predicted less measured force (k,) at the judged rows."""
+        channels, time = self.true(log.channels, theta), log.time
+        expected = self.at(theta).force(channels, self._values(theta))
+        measured = channels.others[self.answer][channels.rows]
+        if self.answer in self.at(theta).inputs:  # in the unit of what the motor was told
+            return np.asarray((expected - measured) / self._gain(theta))
+        shown = self.sensors.shown(theta, self.answer, Series(time, expected))
+        return np.asarray(shown.value - measured)
+
+    def _gain(self, theta: Theta) -> float:
+        """Force of the motor over the force that the log says."""
+        listed = self.model.parameters.get("axis_scale.k")  # which theta scales, if there is one
+        gain = theta.get("axis_scale.k", 1.0) * (listed[1] if listed else 1.0)
+        return max(gain, LEAST)
+
+    def variance(self, log: RigLog, usual: float) -> Array:
+        """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt
+        where the sign of the rate is."""
+        channels = log.channels
+        slopes = self.at({}).slopes(channels, self._values({}))
+        sigmas = [channels.a_sigma, *(channels.sigma[n] for n in self.at({}).inputs)]
+        noise = (slopes * sigmas) ** 2
+        total = noise.sum(axis=1) + (usual * log.doubt) ** 2
+        if self.answer not in self.at({}).inputs:
+            total = total + channels.sigma[self.answer] ** 2
+        else:  # the motor's force enters once: as what was measured, in whose unit all else counts
+            others = (total - noise[:, -1]) / self._gain({}) ** 2
+            total = others + channels.sigma[self.answer] ** 2
+        return np.asarray(total)
+
+    def true(self, log: Filtered, theta: Theta) -> Filtered:
+        """The channels without the faults of their sensors, but for the one that is predicted."""
+        if not self.sensors.present and not any(is_fault(name) for name in theta):
+            return log
+        seen = Series(log.time, log.q, (log.v, log.a))
+        moved = self.sensors.behind(theta, self.place, seen)
+        others = {
+            name: self.sensors.behind(theta, name, Series(log.time, y)).value
+            for name, y in log.others.items()
+            if name != self.answer
+        }
+        others[self.answer] = log.others[self.answer]
+        v, a = moved.rates
+        read = moved.value + log.read - log.q
+        return replace(log, q=moved.value, v=v, a=a, others=others, read=read)
+
+    def _values(self, theta: Theta) -> dict[str, float]:
+        return self.values(theta, self.at(theta).names)

@@ -1,0 +1,207 @@
+"""Robot logs as the fit reads them: nodes about a millisecond apart, several runs side by side.
+
+Arrays (n, L, .) have the run as their second axis and are padded at the end; functions take flat
+ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from kemba.effects.pneumatics.switching import Pulse, pulses
+from kemba.effects.sensors import CHANNELS
+from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
+from kemba.identify.problem.types import Array, Flags
+from kemba.trajectory import Trajectory
+
+SHORTEST = 0.7e-3  # denser rows are averaged [s]
+LONGEST = 1.6e-3  # nodes farther apart are filled [s]
+# smallest noise of a channel, in m or rad: far below what position sensors resolve
+FINEST = 1e-6
+
+
+@dataclass(frozen=True)
+class ResampledLog:
+    """One run: `time` (n,) of the nodes, `y` (n, m) with NaN where nothing was measured,
+    `torque` (n, legs) held from each node, the pulses `sent` to each valve, `sigma` (m,) of one
+    value of `y`. `memory` (m,): correlation time [s] of the noise as the sidecar states it, NaN
+    where it does not; `stated` (m,): whether the sidecar states its sigma. `read` (n, m): when each
+    value of `y` was read [s], where that is not at its node."""
+
+    name: str
+    time: Array
+    y: Array
+    torque: Array
+    sent: tuple[list[Pulse], ...]
+    sigma: Array
+    memory: Array
+    stated: np.ndarray[Any, np.dtype[np.bool_]]
+    read: Array | None = None
+
+    def moved(self, rows: Array) -> ResampledLog:
+        """The same run with the readings of each channel so many `rows` (m,) earlier, where their
+        sensor saw them; noise stays as white as it was."""
+        n = len(self.time)
+        places = np.arange(n)[:, None] + rows.astype(int)
+        within, at = (places >= 0) & (places < n), np.clip(places, 0, n - 1)
+        y = np.where(within, np.take_along_axis(self.y, at, axis=0), np.nan)
+        return replace(self, y=y, read=self.time[at])
+
+
+def resample(
+    log: Trajectory, channels: Sequence[str], legs: Sequence[str], name: str
+) -> ResampledLog:
+    """The nodes of a log."""
+    keep = np.isfinite(log.time)
+    time = log.time[keep]
+    raw = np.stack([log[c][keep] for c in channels], axis=1)
+    torque = np.stack([_held(log[f"{leg}/hip/tau"][keep]) for leg in legs], axis=1)
+    valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
+    sent = tuple(pulses(time, _held(log[v][keep])) for v in valves)
+    sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
+    times = log.meta.get("noise_time") or {}
+    memory = np.array([times.get(c, np.nan) for c in channels])
+    stated = np.array([_stated(log, c) is not None for c in channels])
+    time, raw, torque, count = _thin(time, raw, torque)
+    time, raw, torque = _fill(time, raw, torque)
+    less = np.where(np.isfinite(memory), 1.0, np.sqrt(count))  # the mean of white noise is smaller
+    return ResampledLog(name, time, raw, torque, sent, sigma / less, memory, stated)
+
+
+def _held(values: Array) -> Array:
+    """Commands with gaps filled by the last one sent."""
+    index = np.where(np.isfinite(values), np.arange(len(values)), 0)
+    return np.nan_to_num(values[np.maximum.accumulate(index)])
+
+
+def _sigma(log: Trajectory, channel: str, values: Array) -> float:
+    """Noise of one sample: as the sidecar says, else as its values tell, else the usual one."""
+    stated = _stated(log, channel)
+    if stated is not None:
+        return stated
+    if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
+        return CHANNELS[channel.split("/")[-1]][1]
+    return max(difference_sigma(values), FINEST)
+
+
+def _stated(log: Trajectory, channel: str) -> float | None:
+    """Noise of a channel as the sidecar says, if it does."""
+    noise = log.meta.get("noise") or {}
+    for key in (channel, f"{channel} [{log.unit(channel)}]"):
+        if key in noise:
+            return float(noise[key])
+    return None
+
+
+def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
+    """Averages of so many rows that nodes are at least `shortest` apart."""
+    count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
+    if np.median(np.diff(time)) >= SHORTEST or count == 1:
+        return time, raw, torque, 1
+    n = len(time) // count * count
+    with np.errstate(invalid="ignore"):
+        parts = [a[:n].reshape(n // count, count, -1).mean(axis=1) for a in (time[:, None], raw)]
+    held = torque[:n].reshape(n // count, count, -1).mean(axis=1)
+    # a command sent during the mean acts half a bin later than the bin's centre
+    return parts[0][:, 0], parts[1], 0.5 * (held + np.roll(held, -1, axis=0)), count
+
+
+def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:
+    """Nodes without measurement where rows are far apart."""
+    pieces = np.maximum(1, np.ceil(np.diff(time) / LONGEST)).astype(int)
+    if (pieces == 1).all():
+        return time, raw, torque
+    start = np.repeat(np.arange(len(pieces)), pieces)
+    inside = np.arange(len(start)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    step = np.diff(time) / pieces
+    times = np.append(time[start] + inside * step[start], time[-1])
+    filled = np.vstack([np.where((inside == 0)[:, None], raw[start], np.nan), raw[-1:]])
+    return times, filled, np.vstack([torque[start], torque[-1:]])
+
+
+@dataclass(frozen=True)
+class Batch:
+    """`resampled` as arrays whose second axis is the run; steps past a run's end stand still.
+
+    `source`: the runs as they were recorded, where late readings stand at earlier nodes here.
+    """
+
+    resampled: tuple[ResampledLog, ...]
+    source: Batch | None = None
+
+    def moved(self, rows: Array) -> Batch:
+        """The recorded runs with the readings of each channel so many `rows` (m,) earlier."""
+        recorded = self.source or self
+        if not rows.any():
+            return recorded
+        return Batch(tuple(log.moved(rows) for log in recorded.resampled), recorded)
+
+    @cached_property
+    def n(self) -> int:
+        return max(len(t.time) for t in self.resampled)
+
+    @cached_property
+    def valid(self) -> Flags:
+        """(n, L): is this a node of the run?"""
+        return np.arange(self.n)[:, None] < [len(t.time) for t in self.resampled]
+
+    @cached_property
+    def h(self) -> Array:
+        """(n, L): seconds from each node to the next, 1 ms where there is none."""
+        steps = [np.append(np.diff(t.time), 1e-3) for t in self.resampled]
+        return self.pad(steps, 1e-3)
+
+    @cached_property
+    def time(self) -> Array:
+        """(n, L): times of the nodes [s], zero past a run's end."""
+        return self.pad([t.time for t in self.resampled], 0.0)
+
+    @cached_property
+    def y(self) -> Array:
+        """(n, L, m): readings, NaN past a run's end."""
+        return self.pad([t.y for t in self.resampled], np.nan)
+
+    @cached_property
+    def torque(self) -> Array:
+        """(n, L, legs): hip torques [N.m], zero past a run's end."""
+        return self.pad([t.torque for t in self.resampled], 0.0)
+
+    @cached_property
+    def sigma(self) -> Array:
+        """(L, m): noise of one node's value."""
+        return np.stack([t.sigma for t in self.resampled])
+
+    @cached_property
+    def memory(self) -> Array:
+        """(m,): stated correlation time [s] of each channel's noise, NaN where none is stated."""
+        memories = np.stack([t.memory for t in self.resampled])
+        known = np.isfinite(memories).any(axis=0)
+        return np.where(known, np.nan_to_num(memories).max(axis=0), np.nan)
+
+    @cached_property
+    def stated(self) -> Flags:
+        """(m,): whether the noise of a channel is stated for every run."""
+        found: Flags = np.all([t.stated for t in self.resampled], axis=0)
+        return found
+
+    def pad(self, parts: Sequence[Array], value: float) -> Array:
+        """(n, L, .) of one array (n_l, .) per run."""
+        whole = np.full((self.n, len(parts), *parts[0].shape[1:]), value)
+        for i, part in enumerate(parts):
+            whole[: len(part), i] = part
+        return whole
+
+    def flat(self, values: Array) -> Array:
+        """(n, L, .) -> (N, .): the nodes that are."""
+        return np.asarray(values[self.valid])
+
+    def deep(self, values: Array, fill: float = 0.0) -> Array:
+        """(N, .) -> (n, L, .)."""
+        whole = np.full((*self.valid.shape, *values.shape[1:]), fill)
+        whole[self.valid] = values
+        return whole

@@ -1,1 +1,0 @@
-"""A robot model along measured motion: forces, air, linearisation."""

@@ -1,0 +1,256 @@
+"""Forces that a robot model may lack: their channels, simple terms, and d(t) with its 95 % band.
+
+Every channel's unknown force is a first-order lag of white noise, and a state of the filter. Its
+strength is learnt from the data; a channel that needs no force ends with almost none. In stance
+the contact forces are unknown too, so only the force that they cannot explain is found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.identify.compare.force_profiles import lags, risen
+from kemba.identify.problem.missing_force import dahl, end_terms, spans
+from kemba.identify.problem.types import Array, Flags, ForceChannel, MissingForce, Theta
+from kemba.identify.robot.filter import System, gains, smooth_with_band
+from kemba.identify.robot.reference import QUIET, densities
+from kemba.identify.robot.rows import SIDES, air_forces, changes
+from kemba.identify.robot.state import LinearisedState
+
+BODY = {"body z": 1, "body x": 0}  # place among the channels
+
+# A force of each channel that is neither small nor large.
+USUAL_FORCE_BODY = 3.0  # on the body [N]
+HIP = 0.5  # at a hip [N.m]
+ROD = 10.0  # on a rod [N]: friction of 6 to 8 N by the paper's tables
+
+
+def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
+    """Rods and hips (both legs share a force profile), then the body along z and x.
+
+    A force is looked for where it shows: of hips and body in flight, of rods off their stops.
+    """
+    flying = [(s.phase == "flight").astype(float) for s in state.schedules]
+    where = state.batch.pad(flying, 0.0)[..., None] > 0.5
+    y, rate = state.motion.y, state.motion.rate
+    found = [_rods(state), _hips(state, where)]
+    for name, k in BODY.items():
+        quantities = {
+            "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
+            "position [m]": np.where(where, y[..., [k]], np.nan),
+        }
+        found.append(
+            ForceChannel(name, "N", USUAL_FORCE_BODY, quantities, _force_columns(state, [k]))
+        )
+    return found
+
+
+def _rods(state: LinearisedState) -> ForceChannel:
+    motion, batch, legs = state.motion, state.batch, len(state.physics.legs)
+    stopped = batch.pad([(s.low | s.high).astype(float) for s in state.schedules], 1.0)
+    where = (stopped < 0.5) & batch.valid[..., None]
+    quantities = {
+        "speed [m/s]": motion.rate[..., 3 + legs :],
+        "position [mm]": 1e3 * motion.y[..., 3 + legs :],
+        "air force [N]": air_forces(state),
+    }
+    return ForceChannel(
+        "rods",
+        "N",
+        ROD,
+        {label: np.where(where, values, np.nan) for label, values in quantities.items()},
+        _force_columns(state, range(3 + legs, 3 + 2 * legs)),
+        {side: _after(state, f"valve/{side}") for side in SIDES},
+    )
+
+
+def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
+    legs = range(3, 3 + len(state.physics.legs))
+    quantities = {
+        "speed [rad/s]": state.motion.rate[..., legs],
+        "angle [rad]": state.motion.y[..., legs],
+        "torque [N.m]": state.batch.torque,
+    }
+    return ForceChannel(
+        "hips",
+        "N.m",
+        HIP,
+        {label: np.where(where, values, np.nan) for label, values in quantities.items()},
+        _force_columns(state, legs),
+        {"hip/tau": _after(state, "hip/tau")},
+    )
+
+
+def _after(state: LinearisedState, command: str) -> Array:
+    """How much each leg's own command rose before every node, (n, L, legs, lags)."""
+    batch, legs = state.batch, state.physics.legs
+    runs = []
+    for log in batch.resampled:
+        sent = changes(log, legs)
+        own = [risen(*sent[f"{leg}/{command}"], log.time) for leg in legs]
+        runs.append(np.stack(own, axis=1).reshape(len(log.time), -1))
+    return batch.pad(runs, 0.0).reshape(*batch.valid.shape, -1, len(lags()) - 1)
+
+
+def _force_columns(state: LinearisedState, channels: Sequence[int]) -> Callable[[Array], Array]:
+    """Function from forces (n, L, ports, b) on these channels to columns (rows, b) of residual."""
+    motion = state.motion
+
+    def columns(force: Array) -> Array:
+        pushes = motion.inverse @ motion.channels[..., list(channels)]
+        return state.pick(state.pushed(np.einsum("nlkp,nlpb->nlkb", pushes, force)))
+
+    return columns
+
+
+# Constants of the simple force terms that are tried on robots.
+SPEED = 0.1  # speed over which friction at a hip turns round [rad.s-1]
+CREEPS = (0.003, 0.006, 0.012)  # travel over which a hysteresis turns round [m]
+RIPPLES = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of the hip
+ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
+
+
+def formula_columns(state: LinearisedState) -> dict[str, Array]:
+    """Columns (rows,) per unit of the coefficient, by the formula a model's YAML would hold."""
+    y, rate = state.motion.y, state.motion.rate
+    legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
+    hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
+    groups = (
+        (range(3 + legs, 3 + 2 * legs), "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
+        (range(3, 3 + legs), "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
+        ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
+        ([0], "body x", _drag_terms("x", rate[..., [0]])),
+    )
+    found: dict[str, Array] = {}
+    for channels, name, terms in groups:
+        listed = list(terms)
+        columns = _force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
+        found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
+    return found
+
+
+def _rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
+    """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
+    sign = np.tanh(v / V_COULOMB)
+    yield from end_terms(x, stroke)
+    yield f"{stroke / 2:g} - x", stroke / 2 - x
+    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
+    yield "max(v, 0)", np.maximum(v, 0.0)
+    yield "min(v, 0)", np.minimum(v, 0.0)
+    yield "v**3", v**3
+    yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
+    yield f"tanh(v/{V_COULOMB:g})*x", sign * x
+    for travel in CREEPS:
+        paths = x.reshape(len(x), -1).T
+        turned = np.stack([dahl(path, travel) for path in paths], axis=1)
+        yield f"dahl(x, {travel:g})", turned.reshape(x.shape)
+
+
+def _hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
+    """(formula, torque at the hip (n, L, legs)) of angle, rate and the torque commanded."""
+    sign = np.tanh(w / SPEED)
+    for n in RIPPLES:
+        yield f"sin({n}*q)", np.sin(n * q)
+    yield f"abs(tau)*tanh(w/{SPEED:g})", np.abs(torque) * sign
+    yield "w*abs(w)", w * np.abs(w)
+    yield "tau**3", torque**3
+    yield "max(w, 0)", np.maximum(w, 0.0)
+
+
+def _body_terms(name: str, at: Array, v: Array) -> Iterator[tuple[str, Array]]:
+    """(formula, force on the body (n, L, 1)) along one axis."""
+    yield from _drag_terms(name, v)
+    for height in ROPES:
+        yield f"max({name} - {height:g}, 0)", np.maximum(at - height, 0.0)
+
+
+def _drag_terms(name: str, v: Array) -> Iterator[tuple[str, Array]]:
+    """(formula, force on the body (n, L, 1)) of its velocity alone."""
+    yield f"v{name}*abs(v{name})", v * np.abs(v)
+    yield f"v{name}**3", v**3
+
+
+class RobotMissingSettings:
+    """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
+
+    memory = 0.025  # correlation time of the missing force [s]
+    rounds = 4  # rounds in which its strength is learnt
+    body = 5.0  # strength with which learning begins [N]
+    pitch = 0.5  # the same of the moment on the body [N.m]
+    hip = 0.5  # the same of the torque at a hip [N.m]
+    piston = 10.0  # the same of the force on a rod [N]
+    negligible = 0.1  # strength of a force that is as good as none [N]
+    negligible_moment = 0.01  # the same of a moment [N.m]
+
+
+def robot_missing(
+    state: LinearisedState, theta: Theta, strength: Array | None = None
+) -> list[MissingForce]:
+    """d(t) per run: force on the body [N], moments at pitch and hips [N.m], force on the rods [N].
+
+    `strength` (k,): 1 sigma of each channel's force; learnt when not given.
+    """
+    names = state.physics.channels
+    kinds = [_kind(name) for name in names]
+    settings = RobotMissingSettings
+    begin = np.array([getattr(settings, kind) for kind in kinds])
+    sigma = begin if strength is None else strength
+    moment = np.isin(kinds, ("pitch", "hip"))
+    least = np.where(moment, settings.negligible_moment, settings.negligible)
+    quiet = densities(state.physics, state.batch, state.schedules, QUIET)
+    y, g = state.measurement(theta), state.acceleration(theta)
+    valid, k = state.batch.valid, len(names)
+    for _ in range(settings.rounds if strength is None else 1):
+        system = _with_forces(state, quiet, sigma)
+        x, variance = smooth_with_band(system, gains(system), y, g)
+        power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
+        ratio = np.sqrt(power) / sigma
+        # towards nothing such rounds creep, so that their steps are doubled
+        used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
+    units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
+    found = []
+    for i, log in enumerate(state.batch.resampled):
+        n = len(log.time)
+        force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
+        down = spans(log.time, state.schedules[i].phase != "flight")
+        found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
+    return found
+
+
+def _kind(channel: str) -> str:
+    last = channel.split("/")[1] if channel.count("/") > 1 else channel
+    return {"body/pitch": "pitch", "hip": "hip", "piston": "piston"}.get(last, "body")
+
+
+def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
+    """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
+
+    `density` (n, L, c): of the other unknown forces.
+    """
+    base = state.motion.system_with(density, state.batch.h)
+    h, k = state.batch.h, len(sigma)
+    n, runs, m, d = base.H.shape
+    pushes = state.motion.channels[..., :k]  # generalised force per channel force
+    F = np.zeros((n, runs, d + k, d + k))
+    F[..., :d, :d] = base.F
+    accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
+    F[..., :d, d:] = accelerations
+    keep = np.exp(-h / RobotMissingSettings.memory)
+    i = np.arange(k)
+    F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
+    j = base.G.shape[3]
+    G = np.zeros((n, runs, d + k, j + k))
+    G[..., :d, :j] = base.G
+    G[..., d + i, j + i] = 1.0
+    W = np.zeros((n, runs, j + k, j + k))
+    W[..., :j, :j] = base.W
+    W[..., j + i, j + i] = (1.0 - keep**2)[..., None] * sigma**2
+    H = np.zeros((n, runs, m, d + k))
+    H[..., :d] = base.H
+    P0 = np.zeros((runs, d + k, d + k))
+    P0[:, :d, :d] = base.P0
+    P0[:, d + i, d + i] = sigma**2
+    return System(F, G, W, H, base.R, P0)

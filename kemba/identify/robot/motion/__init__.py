@@ -1,1 +1,0 @@
-"""Motion along a robot log: samples, contacts, a Kalman filter over them."""

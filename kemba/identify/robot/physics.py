@@ -1,0 +1,288 @@
+"""Numeric functions of a robot model along measured motion, mapped over many samples at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from kemba.identify.problem.candidates import leg_by_leg, link_figures, nominal_figures
+from kemba.identify.problem.types import Array, Flags
+from kemba.machine_code import Native
+from kemba.mechanism.robot import link_regressors
+from kemba.model.exponential import midpoint_step
+from kemba.model.model import Model
+from kemba.model.rest import Rest, rate_of
+from kemba.quantity import Quantity
+
+
+class SampleMap:
+    """A function of samples; the answers are those of CasADi's own machine."""
+
+    def __init__(self, function: ca.Function) -> None:
+        given = function.sx_in()
+        outputs = function.call(given)
+        self._name = function.name()
+        self._widths = [symbol.numel() for symbol in given]
+        self._shapes = [output.shape for output in outputs]
+        by_rows = [ca.reshape(output.T, output.numel(), 1) for output in outputs]
+        self._code = Native(given, {self._name: [ca.vertcat(*by_rows)]})
+
+    def __call__(self, samples: Sequence[Array], p: Array | None = None) -> list[Array]:
+        """Arrays (N, rows) or (N, rows, columns) from samples (N, .); `p` (k,): the last input,
+        the same for every sample."""
+        given = [*samples] if p is None else [*samples, p]
+        count = len(samples[0])
+        x = np.empty((count, sum(self._widths)))
+        edges = np.cumsum([0, *self._widths])
+        for values, first, end in zip(given, edges[:-1], edges[1:], strict=True):
+            x[:, first:end] = values
+        y = np.zeros((count, sum(rows * columns for rows, columns in self._shapes)))
+        self._code.rows(self._name, x, y)
+        ends = np.cumsum([rows * columns for rows, columns in self._shapes])
+        blocks = np.split(y, ends[:-1], axis=1)
+        return [
+            block if columns == 1 else block.reshape(count, rows, columns)
+            for block, (rows, columns) in zip(blocks, self._shapes, strict=True)
+        ]
+
+
+Index = np.ndarray[Any, np.dtype[np.int_]]
+
+
+class StateRunner:
+    """Integrates s' = rate(q, v, s, u, p) for given motion, from rest at its first place."""
+
+    def __init__(self, symbols: list[ca.SX], rate: ca.SX, quantities: Sequence[Quantity]) -> None:
+        q, v, s, u, p = symbols
+        self.count = s.numel()
+        if not self.count:
+            return
+        self._rest = Rest(s, [q, v, u, p], rate, quantities)
+        self._symbols, self._rate = symbols, rate
+        self._codes: dict[bytes, Native] = {}
+
+    def run(
+        self, h: Array, q: Array, v: Array, u: Array, p: Array, among: Index | None = None
+    ) -> Array:
+        """Mean of the states (N, ns) over steps h (N,) with q, v, u (N, .) held over each.
+
+        `among`: states that are asked for, and that depend on no others (None: all); the others
+        stay at rest.
+        """
+        count = len(h)
+        if not self.count:
+            return np.empty((count, 0))
+        own = np.arange(self.count) if among is None else among
+        rest, ns = self._rest(q[0], 0.0 * v[0], u[0], p), len(own)
+        same = np.broadcast_to(p, (count, len(p)))
+        given = np.hstack([h[:, None], q, v, u, same])
+        x = np.zeros((count + 1, ns + given.shape[1]))
+        x[:-1, ns:] = given
+        x[0, :ns] = rest[own]
+        means = np.zeros((count, ns))
+        # each step begins where the one before has ended
+        self._code(own).rows("step", x[:-1], x[1:, :ns], means)
+        whole = np.tile(rest, (count, 1))
+        whole[:, own] = means
+        return whole
+
+    def _code(self, own: Index) -> Native:
+        """A step of these states."""
+        key = own.tobytes()
+        if key not in self._codes:
+            q, v, s, u, p = self._symbols
+            h, held = ca.SX.sym("h"), [q, v, u, p]
+            at = own.tolist()
+            step = midpoint_step(self._rate[at], s[at], held, held, h)
+            self._codes[key] = Native([s[at], h, *held], {"step": step})
+        return self._codes[key]
+
+
+FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
+REACH = 4.0  # largest error, in sigmas: beyond chance
+LEAST = 0.2  # smallest value, as a share of the nominal one
+
+
+class Physics:
+    """Residual forces, state rates and kinematics of `model`, vectorised over samples.
+
+    Contact and end stops are left out: where they act is read from the data. `names` are the free
+    parameters in the order of every `p`, those of `free` first, then the nuisance ones. `figures`:
+    nuisance parameters that are known less well, with value and 1 sigma: of every leg alike; a
+    table is scaled. `links`: figures of links that may be off, as `Problem.nuisance`; they are no
+    part of `p`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        free: tuple[str, ...],
+        grip: float = 1.0,
+        figures: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        self.base = model
+        self.model = leg_by_leg(model)
+        plain = {n: v for n, v in (figures or {}).items() if n in model.parameters}
+        tables = {n: v for n, v in (figures or {}).items() if n not in plain}
+        scaled = {**tables, **nominal_figures(self.model, free)}
+        self.nuisance = {**plain, **scaled}
+        self.links = link_figures(model)
+        self.names = (*free, *self.nuisance)
+        self.nominal = np.array(
+            [model.parameters[n][1] for n in free] + [v for v, _ in self.nuisance.values()]
+        )
+        self.bounds = self._bounds(figures or {})
+        self.node = node = self.model.build((*free, *plain), scaled)
+        self.p = node.p
+        self.mechanism, self.legs = model.mechanism, model.mechanism.legs
+        self.inputs = tuple(q.name for q in self.model.inputs.values())
+        rate = rate_of(node)
+        self.moves = np.array(ca.which_depends(rate, self.p, 1), dtype=bool)
+        self.moving = [n for n, moves in zip(self.names, self.moves, strict=True) if moves]
+        p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
+        states = list(self.model.states.values())
+        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
+        self._follows = ca.jacobian_sparsity(rate, node.s)
+        self.lengths = np.array([n.startswith("geometry:") for n in self.names])
+        self.grip = grip
+        self._maps: dict[str, SampleMap] = {}
+        self._knees: dict[tuple[int, bytes], tuple[Array, Array]] = {}
+
+    def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
+        """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
+        may not leave: a negative area has no flow."""
+        lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
+        for name, (value, sigma) in figures.items():
+            i, reach = self.names.index(name), REACH * sigma
+            declared = self.base.parameters[name][0] if name in self.base.parameters else None
+            lower[i] = max(value - reach, LEAST * value)
+            upper[i] = min(value + reach, declared.upper if declared else np.inf)
+        return lower, upper
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Measured channels, one per coordinate: the knees are measured by their pistons."""
+        pistons = tuple(f"{leg}/piston/x" for leg in self.legs)
+        return tuple(c.name for c in self.mechanism.coordinates[: 3 + len(self.legs)]) + pistons
+
+    @cached_property
+    def functions(self) -> dict[str, ca.Function]:
+        """All functions of samples, by name."""
+        node = self.node
+        r = self._force
+        full = [node.q, node.v, node.a, node.s, node.u, self.p]
+        y = ca.vertcat(*(node.outputs[name] for name in self.channels))
+        feet, feet_rate, feet_slope = self._feet()
+        motion = [node.q, node.v, self.p]
+        named = {
+            "residual": (full, [r]),
+            "mass": (full, [ca.jacobian(r, node.a)]),
+            "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
+            "by_parameter": (full, [ca.jacobian(r, self.p)]),
+            "measured": (motion, [y, ca.jtimes(y, node.q, node.v), ca.jacobian(y, node.q)]),
+            "feet": (motion, [feet, feet_rate, feet_slope]),
+            "seen": (motion, [y, feet]),
+        }
+        made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
+        made["links"] = link_regressors(self.mechanism)
+        return made
+
+    def _feet(self) -> tuple[ca.SX, ca.SX, ca.SX]:
+        """Of every foot: place x and height above its ground (2 legs,); their rates and slopes
+        (2 legs, n) along the ground and out of it."""
+        node, ground, found = self.node, self.mechanism.scene.ground, []
+        for leg in self.legs:
+            x, z = (node.outputs[f"{leg}/foot/{axis}"] for axis in "xz")
+            across, up = ground.normal(x)
+            (vx, vz), (Jx, Jz) = (
+                (ca.jtimes(x, node.q, node.v), ca.jtimes(z, node.q, node.v)),
+                (ca.jacobian(x, node.q), ca.jacobian(z, node.q)),
+            )
+            found.append((x, up * vx - across * vz, up * Jx - across * Jz))
+            found.append((z - ground.height(x), across * vx + up * vz, across * Jx + up * Jz))
+        places, rates, slopes = (ca.vertcat(*parts) for parts in zip(*found, strict=True))
+        return places, rates, slopes
+
+    @cached_property
+    def straight(self) -> tuple[Flags, Flags]:
+        """Parameters (k,) in which the force at given effect states is linear, and pairs (k, k)
+        of parameters that multiply each other."""
+        slopes = ca.jacobian(self._force, self.p)
+        rows, _, count = *slopes.shape, self.p.numel()
+        second = ca.jacobian_sparsity(ca.vec(ca.densify(slopes)), self.p)
+        bends = np.zeros((count, count), bool)
+        for row, column in zip(*second.get_triplet(), strict=True):
+            bends[row // rows, column] = True
+        return ~(np.diag(bends) | self.moves), bends
+
+    def states_at(self, p: Array) -> Index | None:
+        """Effect states that forces at p (k,) depend on; None: all of them."""
+        switches, without = self._without
+        return None if np.any(p[switches] != 0.0) else without
+
+    @cached_property
+    def _without(self) -> tuple[Index, Index]:
+        """Parameters that switch effects with states on, and the states that matter while all of
+        them are zero."""
+        named = [
+            f"{effect.name}.{field}"
+            for effect in self.base.effects
+            if effect.states()
+            for field, off in effect.off.items()
+            if off == 0.0
+        ]
+        switches = np.array([i for i, n in enumerate(self.names) if n in named], dtype=int)
+        r, zero = self._force, self.p[switches.tolist()]
+        bare = ca.substitute(r, zero, ca.SX.zeros(zero.shape))
+        found = set(ca.jacobian_sparsity(bare, self.node.s).get_triplet()[1])
+        pairs = list(zip(*self._follows.get_triplet(), strict=True))
+        while more := {of for state, of in pairs if state in found} - found:
+            found |= more
+        return switches, np.array(sorted(found), dtype=int)
+
+    @property
+    def _force(self) -> ca.SX:
+        """Generalised force (n,) that a motion needs beyond model and contact."""
+        return ca.substitute(self.node.dynamics, self.node.lam, 0 * self.node.lam)
+
+    def call(self, name: str, *samples: Array, p: Array | None = None) -> list[Array]:
+        """Function `name` over samples (N, .): arrays (N, rows) or (N, rows, columns)."""
+        if name not in self._maps:
+            self._maps[name] = SampleMap(self.functions[name])
+        return self._maps[name](samples, p)
+
+    def knees(self, pistons: Array, p: Array) -> Array:
+        """Knee coordinates (n, legs) of piston extensions (n, legs) at parameters p (k,)."""
+        return np.column_stack(
+            [np.interp(pistons[:, i], *self._knee(i, p)) for i in range(len(self.legs))]
+        )
+
+    def _knee(self, i: int, p: Array) -> tuple[Array, Array]:
+        """Piston extension and knee angle on a fine grid, the extension increasing; the same for
+        all p with the same lengths."""
+        key = (i, p[self.lengths].tobytes())
+        if key not in self._knees:
+            self._knees = {k: v for k, v in self._knees.items() if k[1] == key[1]}
+            self._knees[key] = self._folded(i, p)
+        return self._knees[key]
+
+    def _folded(self, i: int, p: Array) -> tuple[Array, Array]:
+        m, k = self.mechanism, 3 + len(self.legs) + i
+        low, high = m.coordinates[k].lower, m.coordinates[k].upper
+        grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)
+        q = np.zeros((len(grid), m.n))
+        q[:, k] = grid
+        x = self.call("measured", q, 0 * q, p=p)[0][:, k]
+        order = np.argsort(x)
+        return x[order], grid[order]
+
+    def arrange(self, torque: Array, valves: Array) -> Array:
+        """Inputs (nu, N) in the model's order from torques (legs, N) and valves (2 legs, N)."""
+        rows = {f"{leg}/hip/tau": torque[i] for i, leg in enumerate(self.legs)}
+        for i, leg in enumerate(self.legs):
+            rows[f"{leg}/valve/extend"], rows[f"{leg}/valve/retract"] = valves[2 * i : 2 * i + 2]
+        return np.stack([rows[name] for name in self.inputs])

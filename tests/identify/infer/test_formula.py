@@ -1,0 +1,53 @@
+"""How much evidence the best of many formulas needs before it is more than chance."""
+
+from __future__ import annotations
+
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+from toy_problem import Toy
+
+from kemba.identify.infer import formula
+from kemba.identify.infer.formula import by_chance, look
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.significance import BootstrapSettings, NullTest
+from kemba.identify.infer.spike_slab import NULL
+
+
+@pytest.mark.parametrize("width", [0.3, 1.0, 10.0])
+def test_the_best_of_many_absent_terms_passes_less_often_than_a_p_value(width: float) -> None:
+    """Columns of unit noise under a prior of `width` sigma: the log Bayes factor is known."""
+    rng = np.random.default_rng(3)
+    z = rng.standard_normal((20_000, 36))
+    gain = 0.5 * z**2 * width**2 / (1.0 + width**2) - 0.5 * np.log(1.0 + width**2)
+    false = np.mean(gain.max(axis=1) > by_chance(36))
+    assert false <= BootstrapSettings.rare
+
+
+def test_a_stricter_p_value_asks_for_more() -> None:
+    usual = by_chance(36)
+    with patch.multiple(BootstrapSettings, rare=0.01):
+        assert by_chance(36) == pytest.approx(usual + np.log(2.0))
+    assert by_chance(72) == pytest.approx(usual + np.log(2.0))
+
+
+def test_slow_noise_is_taken_for_a_formula_less_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Noise that lasts for 10 ms: terms gain more by it than the best of as many may by chance."""
+    searches = [searched(seed) for seed in range(40)]
+    found = sum(look(search, NULL) is not None for search in searches)
+    careless = NullTest(np.zeros(10), (), 200)
+    monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
+    alarms = sum(look(search, NULL) is not None for search in searches)
+    assert alarms >= 6 and found <= alarms // 2
+
+
+def searched(seed: int) -> Search:
+    """The search on logs of the toy in which nothing is missing."""
+    toy, rng, keep = Toy({}, seed), np.random.default_rng(seed), 0.9
+    white = np.sqrt(1.0 - keep**2) * rng.standard_normal(len(toy.measured))
+    toy.measured += lfilter([1.0], [1.0, -keep], white)
+    search = Search(toy)
+    search.start()
+    return search

@@ -1,0 +1,60 @@
+"""A pattern in what an answer leaves is a reason to doubt it, unless it is negligible or chance."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kemba.identify.compare.force_profiles import ForceProfile
+from kemba.identify.infer import residual as rest
+from kemba.identify.infer import verdict
+from kemba.identify.infer.selection import Selection
+
+
+def left(monkeypatch: pytest.MonkeyPatch, gain: float, force: float, error: float = 1.2) -> str:
+    """The pattern that is told of a missing `force` [N] on rods whose usual one is 10 N."""
+    values = force * np.array([-1.0, 1.0])
+    profile = ForceProfile(
+        "rods", "N", "speed [m/s]", np.zeros(2), values, np.full(2, 1e-3), gain, 10.0
+    )
+    monkeypatch.setattr(rest, "force_profiles", lambda problem, residual: [profile])
+    fit = SimpleNamespace(theta={})
+    found = SimpleNamespace(fitted_error=error, log_evidence=100.0, fit=fit)
+    search = SimpleNamespace(
+        points={("seal_friction",): found, (): SimpleNamespace(log_evidence=0.0)},
+        problem=SimpleNamespace(residual=lambda theta: np.zeros(4)),
+    )
+    return rest.pattern_left(search, ("seal_friction",))  # type: ignore[arg-type]
+
+
+def test_a_force_that_goes_with_speed_is_a_pattern(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert left(monkeypatch, 200.0, 4.0).startswith("a force on the rods is missing")
+
+
+def test_a_negligible_force_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As 0.16 N beside a gas spring that was found right."""
+    assert not left(monkeypatch, 200.0, 0.16)
+
+
+def test_gains_count_by_the_scatter_that_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert left(monkeypatch, 90.0, 4.0, error=1.2)
+    assert not left(monkeypatch, 90.0, 4.0, error=1.3)
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [((2.42, 1.66), "unknown"), ((2.6, 1.52), "partly"), ((1.7, 1.46), "partly")],
+)
+def test_half_is_asked_where_more_is_left_than_a_whole_answer_may_leave(
+    monkeypatch: pytest.MonkeyPatch, error: tuple[float, float], said: str
+) -> None:
+    """The effect explains 40 %, 52 % or 23 % of the excess, and a pattern is left."""
+    best = ("both_mode_loss",)
+    errors = dict(zip(((), best), error, strict=True))
+    monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
+    monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "a force after extend")
+    monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
+    caveats = verdict.caveats_of(SimpleNamespace(), Selection(best), None, None)  # type: ignore[arg-type]
+    assert verdict.verdict_on(best, None, caveats) == said

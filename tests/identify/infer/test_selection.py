@@ -1,0 +1,153 @@
+"""How many effects an answer names: those that left-out data need, and no more."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from toy_problem import Toy
+
+from kemba.identify.discover import discover
+from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.infer.ranking import equivalents
+from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import (
+    Selection,
+    likeliest_part,
+    overclaimed,
+    selected,
+    simplest,
+)
+from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.verdict import caveats_of, verdict_on
+
+
+def windowed(truth: dict[str, float], seed: int = 0, artefact: float = 0.0) -> Toy:
+    """A toy judged over 20 rows. `artefact`: size of an error that changes sign from row to row, as
+    `wave` now does: nothing that lasts."""
+    problem = Toy(truth, seed)
+    problem.window = 20
+    problem._shapes["wave"] = np.where(np.arange(len(problem.measured)) % 2, 1.0, -1.0)
+    problem.measured = problem.measured + artefact * problem._shapes["wave"]
+    return problem
+
+
+def searched(problem: Toy, *best: str) -> Search:
+    search = Search(problem)
+    search.start()
+    for size in range(1, len(best) + 1):
+        search.visit(tuple(sorted(best[:size])))
+    return search
+
+
+def test_nats_that_do_not_last_name_no_effect() -> None:
+    """The rows are sure of the wave, in every block; what is left after 20 rows is not."""
+    problem = windowed({"kick.a": 9.0}, artefact=4.0)
+    search = searched(problem, "kick", "wave")
+    gain = left_out(search, ("kick", "wave"), ("kick",))
+    assert gain.pays and gain.nats > 1000.0
+    alone, both = (left_out_error(search, h) for h in (("kick",), ("kick", "wave")))
+    assert abs(alone - both) < 0.01
+    answer = discover(problem).answer
+    assert (answer.verdict, answer.added) == ("missing", ("kick",))
+    assert answer.ranking[0].probability > 0.95
+    assert any("wave would fit these readings better" in remark for remark in answer.remarks)
+
+
+def test_an_effect_that_left_out_data_need_stays_however_small() -> None:
+    search = searched(windowed({"kick.a": 9.0, "bend.a": 3.0}), "kick", "bend")
+    selection = Selection(("bend", "kick"), 0.01)
+    assert simplest(search, selection) == selection
+
+
+@pytest.mark.parametrize(("beside", "named"), [(0.0, ("hum", "kick")), (4.0, ("kick",))])
+def test_an_effect_is_small_beside_what_the_answer_leaves(beside: float, named: Hypothesis) -> None:
+    """A wave that no effect explains repeats in every run, and hum takes a little of it."""
+    problem = Toy({"kick.a": 9.0, "hum.a": 0.5})
+    problem.measured = problem.measured + beside * np.sin(200 * problem._time)
+    search = searched(problem, "kick", "hum")
+    assert left_out(search, ("hum", "kick"), ("kick",)).nats > 50.0
+    assert simplest(search, Selection(("hum", "kick"), 0.01)).best == named
+
+
+def test_a_larger_answer_with_an_effect_that_was_left_out_is_no_rival() -> None:
+    problem = Toy({"kick.a": 9.0, "hum.a": 0.5, "wave.a": 3.0})
+    problem.measured = problem.measured + 4.0 * np.sin(200 * problem._time)
+    search = searched(problem, "kick", "hum", "wave")
+    found = simplest(search, Selection(("hum", "kick"), 0.01))
+    assert found.best == ("kick",) and ("hum", "kick", "wave") in found.dismissed
+    search.visit(("kick", "wave"))
+    earlier = Selection(("hum", "kick"), 0.01, frozenset({("hum", "kick", "wave")}))
+    assert ("kick", "wave") in simplest(search, earlier).dismissed
+
+
+@pytest.mark.parametrize(("rows", "too_much"), [(-1.0, True), (1.0, False), (5.0, True)])
+def test_a_larger_answer_must_gain_in_left_out_rows_but_not_only_there(
+    rows: float, too_much: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its windows gain 0 nats, with a standard error of 2.3."""
+    doubt = "kemba.identify.infer.selection"
+    monkeypatch.setattr(f"{doubt}.left_out", lambda *of: Gain(rows, abs(rows)))
+    monkeypatch.setattr(f"{doubt}.window_gain", lambda *of: Gain(0.0, 2.3))
+    search = Search(windowed({"kick.a": 9.0}))
+    assert overclaimed(search, ("kick",), ("bend", "kick")) is too_much
+
+
+def test_parts_that_were_refitted_on_the_way_up_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kemba.identify.infer.selection._thin", lambda search, best: None)
+    many = ("bend", "hum", "kick", "wave")
+    search = searched(windowed({"kick.a": 9.0}), "kick", "bend", "hum", "wave")
+    assert simplest(search, Selection(many, 0.01)).best == ("kick",)
+
+
+def test_an_answer_of_many_effects_is_compared_with_its_parts_and_not_with_nothing() -> None:
+    search, many = Search(windowed({"kick.a": 9.0})), ("hum", "kick", "wave")
+    search.start()
+    search.visit(many)
+    part = likeliest_part(search, many)
+    assert len(part) == 2 and "kick" in part
+    assert {("hum", "kick"), ("hum", "wave"), ("kick", "wave")} < set(search.points)
+    assert likeliest_part(search, ("kick",)) == NULL
+
+
+def test_effects_that_do_not_pay_leave_an_answer_one_by_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As after a search that began anew with many effects: none of its parts was refitted."""
+
+    def alone_pays(search: Search, hypothesis: Hypothesis, against: Hypothesis = NULL) -> Gain:
+        return Gain(100.0, 200.0 if len(hypothesis) > 1 else 10.0)
+
+    many = ("hum", "kick", "wave")
+    search = Search(windowed({"kick.a": 9.0, "hum.a": 3.0, "wave.a": 3.0}))
+    search.start()
+    search.visit(many)
+    monkeypatch.setattr("kemba.identify.infer.selection.left_out", alone_pays)
+    assert selected(search, many, p_value=0.0).best == ("kick",)
+
+
+def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
+    """Evidence is far ahead for one of two, by what does not last: the answer is not sure of it."""
+    problem = windowed({"drag.a": 9.0}, seed=1)
+    flicker = np.tile([1.0, -1.0, -1.0, 1.0], len(problem.measured) // 4)
+    problem._shapes["twin"] = problem._shapes["twin"] + 0.02 * flicker
+    problem.measured = problem.measured - 0.3 * flicker
+    search = searched(problem, "drag", "twin")
+    best = ("drag", "twin")
+    found = simplest(search, Selection(best, 0.01))
+    assert found.best == ("drag",) and found.rivals == (("twin",),)
+    assert best in found.dismissed and found.remarks
+    nats = search.points["drag",].log_evidence - search.points["twin",].log_evidence
+    assert nats > 10.0
+    caveats = caveats_of(search, found, None, None)
+    assert verdict_on(found.best, None, caveats) == "partly"
+    assert equivalents(search, found, "drag") == ("twin",)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 5])
+def test_a_small_gain_that_lasts_stays_though_it_is_within_its_scatter(seed: int) -> None:
+    """A small bend: windows gain what the rows do, and the answer leaves nothing but noise."""
+    search = searched(windowed({"kick.a": 9.0, "bend.a": 0.15}, seed), "kick", "bend")
+    gain = left_out(search, ("bend", "kick"), ("kick",))
+    assert 0.0 < gain.nats < gain.error
+    selection = Selection(("bend", "kick"), 0.01)
+    assert simplest(search, selection) == selection

@@ -1,0 +1,92 @@
+"""Is the p-value of nothing what it says? On machines that differ as a discovery believes.
+
+On a linear problem nothing stands between them and the test but the test itself.
+benchmarks/calibration.py asks the same of bench logs of the twin.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+from toy_problem import EFFECTS, Toy
+
+from kemba.identify.discover import discover
+from kemba.identify.infer.selection import Selection, selected
+from kemba.identify.infer.significance import NullTest, best_gain
+from kemba.identify.infer.spike_slab import SpikeSlabSettings
+
+MACHINES = 200
+SIZE = 10.0  # N; the size of every effect of the toy
+
+
+def machine(seed: int) -> dict[str, float]:
+    """Figures off within their tolerance, every effect there with a small share of its size."""
+    rng, prior = np.random.default_rng([seed, 1]), SpikeSlabSettings
+    share, small = rng.choice(prior.tolerances), prior.spike * SIZE
+    z = rng.standard_normal(len(EFFECTS) + 2)
+    truth = {f"{name}.a": small * size for name, size in zip(EFFECTS, z[2:], strict=True)}
+    truth["drag.a"] = abs(truth["drag.a"])
+    return {**truth, "gain": 1.0 + 0.02 * share * z[0], "slope": 0.5 * share * z[1]}
+
+
+def lacking(seed: int) -> tuple[dict[str, float], str, float]:
+    """Such a machine whose model lacks an effect, its name and its size.
+
+    The machine's imperfection adds to the effect or hides some: as much as an interval counts.
+    """
+    rng, prior = np.random.default_rng([seed, 2]), SpikeSlabSettings
+    name = ("kick", "wave", "hum", "ramp")[seed % 4]
+    size = SIZE * rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.5)
+    there = size * (1.0 + prior.spike * rng.standard_normal())
+    return machine(seed) | {f"{name}.a": there}, name, size
+
+
+@pytest.mark.slow
+def test_p_values_are_uniform_and_false_alarms_rare() -> None:
+    answers = [discover(Toy(machine(seed), seed)).answer for seed in range(MACHINES)]
+    p = np.array([answer.p_value_nothing for answer in answers])
+    assert kstest(p, "uniform").pvalue > 0.05
+    assert sum(answer.verdict != "nothing" for answer in answers) <= 0.03 * MACHINES
+
+
+def test_where_every_effect_is_absent_the_test_is_careful() -> None:
+    """Then less is there than the test allows for: p-values are large, not uniform."""
+    p = [discover(Toy({}, seed)).answer.p_value_nothing for seed in range(20)]
+    assert min(p) > 0.5
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
+    inside = []
+    for seed in range(MACHINES):
+        truth, name, size = lacking(seed)
+        answer = discover(Toy(truth, seed)).answer
+        assert answer.ranking[0].effect == name
+        value = answer.ranking[0].parameters["a"]
+        inside.append(value.low <= size <= value.high)
+    assert 0.93 <= np.mean(inside) <= 0.97
+
+
+def search(**gains: float) -> Any:
+    """A finished search where the motion moves: evidence by effects, as a_b for two together."""
+    points = {tuple(name.split("_")): gain for name, gain in gains.items()} | {(): 0.0}
+    found = {h: SimpleNamespace(log_evidence=gain) for h, gain in points.items()}
+    return SimpleNamespace(points=found, problem=SimpleNamespace(moves=True), thorough=False)
+
+
+def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:
+    """The simulated logs are searched for single effects only."""
+    assert best_gain(search(a=2.0, b=3.0, a_b=30.0)) == 3.0
+    assert best_gain(search(a_b=30.0)) == 30.0  # nothing else was refitted
+    assert best_gain(search()) == 0.0
+
+
+def test_what_chance_does_as_often_is_not_believed() -> None:
+    """The search names an effect; every simulated log looks better."""
+    found = search(a=3.0)
+    p_value = NullTest(np.full(99, 50.0), (), 40).p_value(best_gain(found))
+    assert selected(found, ("a",), p_value) == Selection()
