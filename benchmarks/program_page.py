@@ -173,7 +173,7 @@ Before the last row, intervals were those of slopes that hold for the model as i
 of delays did not hold the truth: beside a small lag of the hose, which acts 2 ms later where valves
 open 2 ms later, and beside sensors that are late by parts of a row. Intervals are now taken from
 slopes at the best fit, with nothing read off between rows
-(`kemba/identify/written/joint.py`).
+(`kemba/identify/infer/joint.py`).
 
 Something is missing up to a p-value of {DiscoverSettings.significant:g}. {levels}
 
@@ -187,7 +187,7 @@ slow noise for effects. {noise}
 Delays of a fraction of a row were worst: an edge falls before or after a reading, while a slope
 over a row tells of neither. A refitted delay had the residual of its own size, and the model
 without it had not. Every hypothesis is now scored where it fits best, small effects included, by
-the residual there (`kemba/identify/evidence/small_effects.py`), and logs and simulated logs
+the residual there (`kemba/identify/infer/mode.py`), and logs and simulated logs
 are asked the same: what the slopes about the best fit of nothing say of single effects.
 The verdict also rests on another rule: an effect below a fifth of its size is no finding.
 """

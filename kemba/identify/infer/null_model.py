@@ -186,12 +186,18 @@ class Baseline:
         names = names_of(self.problem, theta)
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
+        self.score(theta, names)
+        self.table = self.ranker(self.point.mode.linear).table()
+
+    def score(self, theta: Mapping[str, float] | None = None, names: Names = ()) -> None:
+        """Score the null with the slopes as they are, at theta or where it was."""
+        theta = self.point.fit.theta if theta is None else theta
+        names = names or self.point.linear.names
         linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
         mode = self._mode(NULL, [theta], linear, self.jacobian)
-        ranker = self.ranker(mode.linear)
-        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, ranker.score(NULL))
-        self.table = ranker.table()
+        score = self.ranker(mode.linear).score(NULL)
+        self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
 
     def judged(
         self, hypothesis: Hypothesis, fit: Fit, names: Names, slopes: Array

@@ -41,6 +41,7 @@ class SearchSettings:
     swapped = 2  # rounds in which effects of an answer are taken away or swapped
     leaders_grown = 3  # effects that are refitted beside the best answer
     leaders_swapped = 2  # effects that are refitted in place of one of the answer
+    far_off = 0.1  # size of an effect from which its secant replaces its slope
 
 
 @dataclass
@@ -66,6 +67,7 @@ class Search:
     own: tuple[Problem, Theta] | None = None
     base: Baseline = field(init=False)
     _thetas: dict[Hypothesis, dict[str, float]] = field(default_factory=dict)
+    _secants: bool = False  # taken since everything was scored
 
     @property
     def ended(self) -> bool:
@@ -241,9 +243,29 @@ class Search:
             name = f"refitting {' + '.join(hypothesis)}"
             self.say(Stage(name, number, of) if of > 1 else name)
             fit = refit(self.problem, hypothesis, self._guess(hypothesis), self.base.frozen)
+            self._take_secant(hypothesis, fit)
             self.points[hypothesis] = self._point(hypothesis, fit)
             self._thetas[hypothesis] = fit.theta
         return self.points[hypothesis]
+
+    def _take_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
+        """From here on a refitted effect counts by its secant, no longer by its slope at nothing.
+
+        Under every hypothesis each absent effect may be there with a small share of its size. Far
+        from nothing its slope promises more than the effect can do: a wrong hypothesis would look
+        good because of a sensor that is late by several rows, which it does not name.
+        """
+        problem, (effect, *others) = self.problem, hypothesis
+        candidate = problem.candidates[effect]
+        if others or not problem.moves or problem.is_straight(candidate.key):
+            return
+        size = fit.theta[candidate.key] - candidate.lead.off
+        if abs(size) > SearchSettings.far_off * candidate.lead.size:
+            own = set(candidate.keys())
+            absent = {k: v for k, v in fit.theta.items() if k not in own}
+            change = problem.residual(fit.theta) - problem.residual(absent)
+            self.base.jacobian[:, self.base.point.linear.index(candidate.key)] = change / size
+            self._secants = True
 
     def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
         """The problem about a refitted point: slopes of its own parameters are those of the fit,
@@ -271,7 +293,11 @@ class Search:
         return {**guess, **{k: v for k, v in point.fit.theta.items() if k not in guess}}
 
     def best(self) -> Hypothesis:
-        """The likeliest of all refitted hypotheses."""
+        """The likeliest of all refitted hypotheses, by the secants that were taken."""
+        if self._secants:
+            self.base.score()
+            others = {h: self._point(h, p.fit) for h, p in self.points.items() if h}
+            self.points, self._secants = {**others, NULL: self.base.point}, False
         count = len(self.problem.candidates)
         return max(self.points, key=lambda h: self.points[h].log_evidence + log_prior(h, count))
 
