@@ -1,13 +1,16 @@
-"""A plan and how good it really is: its certificate, status and sentence."""
+"""A plan and how good it really is: its certificate, status and sentence, its answer in JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
+import numpy as np
+
+from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify
-from kemba.ocp.certificate.grazing import grazes
 from kemba.ocp.certificate.objective import costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
@@ -17,6 +20,7 @@ from kemba.ocp.phases.stages import Stages
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.task.templates import rise_of_feet
 from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
@@ -91,3 +95,115 @@ def clear(found: Plan) -> Plan:
         return found
     what = f"`clearance` is not kept: {touches[0].sentence}"
     return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
+
+
+@dataclass(frozen=True)
+class Graze:
+    """A foot that touches at a time [s] for a `duration` [s] and leaves again."""
+
+    foot: str
+    time: float
+    duration: float
+
+    @property
+    def sentence(self) -> str:
+        """What happens, in words."""
+        lasts = f"{1e3 * self.duration:.0f} ms"
+        return f"{self.foot} touches the ground for {lasts} at {self.time:.3f} s and leaves again"
+
+
+def grazes(plan: Trajectory, euler: bool = False) -> list[Graze]:
+    """The short contacts of a plan's feet between two times in the air.
+
+    `euler`: the plan is an implicit Euler one, whose ground pushes in the whole step before the
+    first row at which a foot is down.
+    """
+    found = []
+    for leg, spans in read(plan, PLANNED).contacts.items():
+        for span in (s for s in spans if not s.firm):
+            row = int(np.searchsorted(plan.time, span.begin))
+            begin = float(plan.time[row - 1]) if euler else span.begin
+            if span.end - begin < LASTS:
+                found.append(Graze(f"{leg}/foot", begin, span.end - begin))
+    return found
+
+
+GROUND = 1e-3  # m; lower feet stand
+
+
+def sentence_of(plan: Plan) -> str:
+    """The plan's sentence for the user; that of a plan which is not what was asked says so."""
+    asked = plan.status in (Status.SOLVED, Status.INTERRUPTED)
+    return plan.sentence if asked else f"FAILED: {plan.sentence}"
+
+
+def warnings(plan: Plan) -> list[str]:
+    """What a task that was met may not have meant."""
+    rests = any(r.location == ("end", "rest") for r in plan.requirements)
+    heights = [gap[-1] for gap in feet(plan.trajectory).values()]
+    if not rests or not heights or min(heights) <= GROUND:
+        return []
+    hint = 'a robot in the air falls; ask for `"*/foot/gap": 0 m` at the end'
+    return [f"the motion ends at rest with no foot on the ground: {hint}"]
+
+
+def answer(plan: Plan, run: str) -> dict[str, Any]:
+    """The JSON of `solve`, also written as certificate.json."""
+    trajectory, certificate = plan.trajectory, plan.certificate
+    tolerances = plan.task.tolerances
+    limit = max(tolerances.complementarity, tolerances.dynamics, tolerances.bounds)
+    return {
+        "status": plan.status,
+        "sentence": sentence_of(plan),
+        "run": run,
+        "task": plan.task.name,
+        "apex_m": float(max(trajectory["body/z"])),
+        "feet_m": rise_of_feet(trajectory),
+        "duration_s": float(trajectory.time[-1]),
+        "cost": plan.cost,
+        "solve_s": plan.solve_s,
+        "solve_cpu_s": plan.solve_cpu_s,
+        "build_s": plan.build_s,
+        "iterations": plan.iterations,
+        "variables": plan.variables,
+        "constraints": plan.constraints,
+        "residuals": {
+            "complementarity": certificate.complementarity,
+            "binary": certificate.binary,
+            "dynamics": certificate.dynamics,
+            "bounds": certificate.bounds,
+        },
+        "replay": None,
+        "table_replay": None,
+        "plant_replay": None,
+        "impacts": None,
+        "requirements": [measured.json() for measured in certificate.asked],
+        "reached": {
+            measured.text.removeprefix("goals.").partition(":")[0]: measured.value
+            for measured in certificate.asked
+            if measured.text.startswith("goals.")
+        },
+        "verdict_on": None,
+        "band": None,
+        "robust": None,
+        "strides": None,
+        "good": plan.status is Status.SOLVED,
+        "continued": plan.continued,
+        "start": plan.start,
+        "best_known": None,
+        "ignored": plan.model.ignored,
+        "remarks": [*plan.model.remarks, *warnings(plan)],
+        "relax": [
+            {
+                name: getattr(r, name)
+                for name in ("requirement", "where", "asked", "reachable", "unit")
+            }
+            for r in plan.relax
+        ],
+        "worst": [
+            {key: value for key, value in asdict(v).items() if key != "size"}
+            for v in certificate.worst
+            if v.size > limit
+        ],
+        "attempts": [asdict(a) for a in plan.attempts],
+    }

@@ -12,10 +12,17 @@ from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.planned import Plan, judge
 from kemba.ocp.relaxation.guess import automatic_guess
-from kemba.ocp.relaxation.lifting import confirm, grow
-from kemba.ocp.relaxation.penalty import METHODS, penalise
-from kemba.ocp.relaxation.resume import resumed
-from kemba.ocp.relaxation.schedule import RELAX, binary, find, fix, refine_grid, tighten
+from kemba.ocp.relaxation.lifting import confirm, grow, resumed
+from kemba.ocp.relaxation.schedule import (
+    METHODS,
+    RELAX,
+    binary,
+    find,
+    fix,
+    penalise,
+    refine_grid,
+    tighten,
+)
 from kemba.ocp.relaxation.session import Schedule, Session, Stopped
 from kemba.ocp.relaxation.settings import Grids
 from kemba.ocp.task.requirement import Requirement

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from kemba.config import Document
 from kemba.errors import KembaError
@@ -15,7 +16,6 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continued import continued, from_scratch, with_grip
 from kemba.ocp.finer import found_and_refined
-from kemba.ocp.guesses import StartGuess, guesses
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -215,3 +215,38 @@ def program_size(task: Task, document: Document, model: str | Path | None = None
         task, built, requirements = as_one(task, document)
     transcription = Transcription(built, task, requirements, whole(built.node), task.nodes)
     return {"variables": transcription.variables, "constraints": transcription.constraints}
+
+
+# noise of a further guess, of every scale: enough for another plan, too little for a strange one
+NOISE = 0.05
+OTHERS = 2  # further guesses at most: each costs as much as the first
+
+
+@dataclass(frozen=True)
+class StartGuess:
+    """A start guess with `noise` drawn by `seed`, and the shortest `pulse` [s] of a valve that is
+    sought from it."""
+
+    pulse: float
+    noise: float
+    seed: int
+
+    @property
+    def update(self) -> dict[str, Any]:
+        """What a task has instead, so that it begins here."""
+        return {"guess_noise": self.noise, "seed": self.seed}
+
+
+def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
+    """The guesses of a task.
+
+    A relaxed valve is open in part; rounded on a grid it opens and closes from node to node. Pulses
+    that are shorter than the filling of a chamber move the leg little, and plans with many of them
+    have no neighbours without. So they are left out first, and taken only where that gives no plan.
+    """
+    fill = max(model.mechanism.need_cylinder().fill)
+    longer = max(fill, task.min_dwell)
+    found = [StartGuess(pulse, task.guess_noise, task.seed) for pulse in (longer, task.min_dwell)]
+    noise = max(task.guess_noise, NOISE)
+    found += [StartGuess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
+    return list(dict.fromkeys(found))

@@ -19,7 +19,7 @@ from kemba.files import write_error
 from kemba.folders import fresh
 from kemba.model import Model
 from kemba.ocp import Task, load_task, task_model
-from kemba.ocp.nlp.program import Program
+from kemba.ocp.functions.problem import Program
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.settings import Relaxation
 from kemba.ocp.task.resolve import resolve

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 from kemba.config import Document
 from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.between import Origin
+from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent
-from kemba.ocp.report import answer
 from kemba.ocp.starts import plan_best
 from kemba.solve.listener import Listener
 from kemba.solve.repairs import repaired

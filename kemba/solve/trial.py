@@ -10,7 +10,7 @@ from kemba.errors import KembaError, enumerated
 from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.report import answer, sentence_of, warnings
+from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, lacking
 from kemba.plant.retiming import retimed
 from kemba.solve.judged import Judged, judged

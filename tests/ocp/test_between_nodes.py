@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kemba.ocp.between_nodes import course
+from kemba.ocp.controller import course
 from kemba.trajectory import Trajectory
 
 CLOCK = np.linspace(0.0, 0.03, 31)

@@ -11,9 +11,9 @@ from ocp.toys import Push, bead, solve
 
 from kemba.model import load_model
 from kemba.ocp import load_task
+from kemba.ocp.functions.problem import violation
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
-from kemba.ocp.nlp.program import violation
 from kemba.ocp.relaxation.lifting import confirm
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.task.resolve import resolve

@@ -14,7 +14,7 @@ from kemba.effects.mechanics.friction import SealFriction
 from kemba.effects.mechanics.load import Payload
 from kemba.model import load_model
 from kemba.ocp.continuation.between import completed, model_between, requirements_between
-from kemba.ocp.continuation.impacts import with_impacts
+from kemba.ocp.continuation.continue_plan import with_impacts
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases, phase_notes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kemba.ocp.relaxation.dwell import dwelling
+from kemba.ocp.relaxation.session import dwelling
 
 H = np.full(20, 2e-3)  # s
 LEAST = 0.01  # s

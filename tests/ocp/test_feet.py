@@ -14,8 +14,8 @@ from kemba.ocp import load_task, task_model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.planning import plan
-from kemba.ocp.task.height import longest_leg, rise_of_feet, with_height
 from kemba.ocp.task.resolve import resolve
+from kemba.ocp.task.templates import longest_leg, rise_of_feet, with_height
 
 
 def test_a_body_at_45_cm_has_its_feet_at_1_cm() -> None:

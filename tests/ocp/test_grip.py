@@ -9,7 +9,7 @@ import pytest
 
 from kemba.errors import ConfigErrors
 from kemba.ocp import Plan, load_task
-from kemba.ocp.certificate.grip import grip_of
+from kemba.ocp.certificate.asked import grip_of
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plan
 from kemba.ocp.reading import asked_of

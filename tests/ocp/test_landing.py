@@ -12,11 +12,11 @@ from kemba.errors import ConfigErrors, KembaError
 from kemba.model import Model, load_model
 from kemba.model.impact import felt
 from kemba.ocp import Task, load_task, task_model
-from kemba.ocp.certificate.grazing import grazes
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
-from kemba.ocp.task.height import longest_leg
+from kemba.ocp.planned import grazes
 from kemba.ocp.task.requirement import Requirement, apex_node
 from kemba.ocp.task.resolve import resolve
+from kemba.ocp.task.templates import longest_leg
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from kemba.ocp import load_task
-from kemba.ocp.functions.code import Code
-from kemba.ocp.functions.constants import parameterised
+from kemba.ocp.functions.code import Code, parameterised
 from kemba.ocp.reading import task_model
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import whole

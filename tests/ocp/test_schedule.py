@@ -10,8 +10,7 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.stagnation import Stagnation
+from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.planned import Plan
 from kemba.ocp.relaxation.course import body_course
 from kemba.ocp.relaxation.settings import Ends

@@ -10,8 +10,16 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.ocp import load_task, task_model
-from kemba.solve.kind import NEAR, distance, figures_of, kind_of
-from kemba.solve.memory import NAME, best_known, list_file, recalled
+from kemba.solve.memory import (
+    NAME,
+    NEAR,
+    best_known,
+    distance,
+    figures_of,
+    kind_of,
+    list_file,
+    recalled,
+)
 from kemba_cli.main import app
 
 

@@ -15,8 +15,7 @@ from kemba.ocp.planning import plan
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, outcomes
 from kemba.solve.judged import plant_of
-from kemba.solve.robust import most_robust
-from kemba.solve.robust_ways import gripping, least_grip, lifted, longer
+from kemba.solve.robust import gripping, least_grip, lifted, longer, most_robust
 
 
 @cache

@@ -8,8 +8,8 @@ from enum import Enum
 from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.certificate.certify import OF_WEIGHT, Certificate
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.task.height import rise_of_feet
 from kemba.ocp.task.task import Task
+from kemba.ocp.task.templates import rise_of_feet
 from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
@@ -15,12 +19,9 @@ from kemba.ocp.continuation.between import (
     model_between,
     requirements_between,
 )
-from kemba.ocp.continuation.impacts import with_impacts
-from kemba.ocp.continuation.renoded import renoded
 from kemba.ocp.nlp import ipopt
-from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.independent import ContradictionError
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases
@@ -39,7 +40,7 @@ from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.settings import Settings, setting
-from kemba.trajectory import Trajectory
+from kemba.trajectory import Array, Trajectory
 
 TRIED = "tuned: jump and jump_forward with other heights, supplies, payloads and distances"
 
@@ -291,3 +292,103 @@ def _ended(program: PhaseProgram, found: Iterate) -> Refined:
     measured = certificate(program, found.Y, trajectory)
     own = Stages.of(program, found)
     return Refined(trajectory, measured, found.ending, found.iterations, phases, stages=own)
+
+
+def with_impacts(program: PhaseProgram, x: np.ndarray, ease: float) -> np.ndarray:
+    """x (size,) with velocities after impacts and impulses that meet the rows of the impact.
+
+    Velocities at the end of the first element after it are carried back to its begin, then changed
+    as little as the rows need; those of the element's stages lie in between. `ease`: how much
+    rather impulses change than velocities.
+    """
+    x, c = x.copy(), program.columns
+    if not program.impacts:
+        return x
+    own = len(c.after[program.impacts[0]]) + len(c.impulse[program.impacts[0]])
+    unknown = program.jump.z[-own:]
+    rows = ca.Function(
+        "rows", [program.jump.z], [program.jump.g, ca.jacobian(program.jump.g, unknown)]
+    )
+    for p in program.impacts:
+        first = program.phases[p].first
+        last = min(first + 1, program.nodes - 1)
+        begin, ends = c.end(first), [c.stages[e][-1]["v"] for e in (first, last)]
+        if program.phases[p].elements > 1:
+            x[c.after[p]] = 2.0 * x[ends[0]] - x[ends[1]]
+        at = np.concatenate([begin["q"], begin["v"], begin["s"], c.after[p], c.impulse[p]])
+        columns = at[-own:]
+        free = program.lower[columns] < program.upper[columns]
+        g, slope = (np.array(part) for part in rows(x[at]))
+        weights = np.where(np.isin(columns, c.impulse[p]), ease, 1.0)[free]
+        x[columns[free]] -= weights * (np.linalg.pinv(slope[:, free] * weights) @ g.ravel())
+        for stage, share in zip(c.stages[first], program.scheme.points, strict=True):
+            x[stage["v"]] = x[c.after[p]] + share * (x[ends[0]] - x[c.after[p]])
+    return np.asarray(np.clip(x, program.lower, program.upper))
+
+
+def renoded(
+    plan: Trajectory,
+    phases: Sequence[Phase],
+    nodes: int,
+    marks: Sequence[float],
+    even: bool = True,
+) -> tuple[Trajectory, list[Phase]] | None:
+    """The plan on `nodes` intervals and its phases there, each with intervals by how long it lasts;
+    without `even` in proportion to those it has, so that what the task asks at nodes stays at the
+    same moments.
+
+    `marks`: fractions of the nodes at which the task asks for something; phases end there, before
+    and after. None where a phase would be left without an interval.
+    """
+    old = phases[-1].last
+    edges = sorted({0.0, 1.0, *(mark for mark in marks if 0.0 < mark < 1.0)})
+    fixed = {round(edge * old): round(edge * nodes) for edge in edges}
+    counts: list[int] = []
+    stops = sorted(fixed)
+    for a, b in itertools.pairwise(stops):
+        inside = [p for p in phases if a <= p.first and p.last <= b]
+        if not inside or inside[0].first != a or inside[-1].last != b:
+            return None
+        t = plan.time
+        weights = [float(t[p.last] - t[p.first] if even else p.elements) for p in inside]
+        share = _shared(weights, fixed[b] - fixed[a])
+        if share is None:
+            return None
+        counts += share
+    borders = np.concatenate([[0], np.cumsum(counts)])
+    found = [
+        replace(p, first=int(borders[i]), last=int(borders[i + 1])) for i, p in enumerate(phases)
+    ]
+    return _resampled(plan, phases, counts), found
+
+
+def _shared(weights: Sequence[float], total: int) -> list[int] | None:
+    """`total` intervals shared in proportion to `weights`, at least one each."""
+    if total < len(weights):
+        return None
+    wanted = np.array(weights) * total / sum(weights)
+    counts = np.maximum(1, np.round(wanted)).astype(int)
+    while counts.sum() != total:
+        sign = 1 if counts.sum() < total else -1
+        gain = np.where((counts > 1) | (sign > 0), sign * (wanted - counts), -np.inf)
+        counts[int(np.argmax(gain))] += sign
+    return [int(c) for c in counts]
+
+
+def _resampled(plan: Trajectory, phases: Sequence[Phase], counts: Sequence[int]) -> Trajectory:
+    """The plan at even steps in each phase. Rows of a phase are those after its first node: there
+    velocities are from before an impact, inputs and forces those of the phase before."""
+    clocks, columns = [plan.time[:1]], {h: [plan[n][:1]] for h, n in _columns(plan)}
+    for phase, count in zip(phases, counts, strict=True):
+        t, rows = plan.time, slice(phase.first + 1, phase.last + 1)
+        clock = t[phase.first] + (t[phase.last] - t[phase.first]) * np.arange(1, count + 1) / count
+        clock[-1] = t[phase.last]
+        clocks.append(clock)
+        for header, name in _columns(plan):
+            columns[header].append(np.interp(clock, t[rows], plan[name][rows]))
+    joined: dict[str, Array] = {header: np.concatenate(parts) for header, parts in columns.items()}
+    return Trajectory(np.concatenate(clocks), joined, plan.meta)
+
+
+def _columns(plan: Trajectory) -> list[tuple[str, str]]:
+    return list(zip(plan.headers, plan.names, strict=True))

@@ -7,6 +7,8 @@ most of the time of building a program, so it is done once for each expression.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,10 +16,9 @@ import casadi as ca
 import numpy as np
 
 from kemba.cache import Recent
-from kemba.ocp.functions.constants import parameterised
+from kemba.instructions import replay
 from kemba.ocp.functions.settings import Functions
 from kemba.ocp.functions.signs import canonical_signs
-from kemba.ocp.functions.vectorised import vectorised
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,3 +111,66 @@ def _rewritten(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX) -> Code:
 def _column(matrix: ca.SX) -> ca.SX:
     """Nonzeros as a dense column, so that mapped outputs line up."""
     return ca.SX(matrix.nz[:]) if matrix.nnz() else ca.SX(0, 1)
+
+
+SHAPING = (-1.0, 0.0, 0.5, 1.0, 2.0)  # CasADi simplifies expressions with these numbers
+
+
+def parameterised(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
+) -> tuple[list[ca.SX], ca.SX, np.ndarray]:
+    """The dense outputs with a symbol (k,) for their distinct constants, and the values (k,)."""
+    f = ca.Function("f", list(inputs), list(outputs))
+    given = [ca.vertsplit(ca.vec(ca.densify(x))) for x in inputs]
+    symbols: dict[float, ca.SX] = {}
+
+    def number(value: float) -> ca.SX:
+        if value in SHAPING:
+            return ca.SX(value)
+        return symbols.setdefault(value, ca.SX.sym(f"c{len(symbols)}"))
+
+    def apply(kind: int, *operands: ca.SX) -> ca.SX:
+        return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(kind, *operands)
+
+    found = replay(f, given, number, apply)
+    results = [ca.SX.zeros(f.sparsity_out(i)) for i in range(f.n_out())]
+    for result, nonzeros in zip(results, found, strict=True):
+        result.nz[:] = ca.vertcat(*nonzeros)
+    return results, ca.vertcat(*symbols.values()), np.array(list(symbols))
+
+
+def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:
+    """f of SX at `points` at once: its inputs (n, points), except the `shared` ones (n,), which
+    are the same at all; dense outputs (m, points). Equal to f at every point to the last bit."""
+    if points < Functions.current().few or f.class_name() != "SXFunction":
+        return f.map(f.name(), "serial", points, list(shared), [])
+    widths = [1 if i in shared else points for i in range(f.n_in())]
+    inputs = [ca.MX.sym(f.name_in(i), f.numel_in(i), w) for i, w in enumerate(widths)]
+    with _as_written():
+        rows = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
+        outputs = replay(f, [[row.T for row in group] for group in rows], ca.MX, _apply)
+        stacked = [_stacked(found, points) for found in outputs]
+        return ca.Function(f.name(), inputs, stacked, {"never_inline": True})
+
+
+def _apply(kind: int, *operands: ca.MX) -> ca.MX:
+    if len(operands) == 1:
+        return ca.MX.unary(kind, operands[0])
+    return ca.MX.binary(kind, operands[0], operands[1])
+
+
+def _stacked(elements: list[ca.MX], points: int) -> ca.MX:
+    """Elements (points,), or scalars that are the same at all, as rows."""
+    rows = [e if e.numel() == points else ca.repmat(e, points) for e in elements]
+    return ca.horzcat(*rows).T if rows else ca.MX(0, points)
+
+
+@contextmanager
+def _as_written() -> Iterator[None]:
+    """Without CasADi's simplifications, which may change the rounding."""
+    before = ca.GlobalOptions.getSimplificationOnTheFly()
+    ca.GlobalOptions.setSimplificationOnTheFly(False)
+    try:
+        yield
+    finally:
+        ca.GlobalOptions.setSimplificationOnTheFly(before)

@@ -1,4 +1,4 @@
-"""A proximal term: a small cost on the distance from the start.
+"""Terms added to a program. A proximal term: a small cost on the distance from the start.
 
 Where the cost is flat, as for forces that legs share, Newton steps become long without any gain and
 lose feasibility. The proximal term gives these directions curvature and hardly moves the optimum.
@@ -11,6 +11,7 @@ from functools import cached_property
 import casadi as ca
 
 from kemba.ocp.functions.problem import NlpFunctions
+from kemba.ocp.functions.settings import Newton
 
 
 class Proximal:
@@ -58,3 +59,10 @@ class Proximal:
     @property
     def _cost(self) -> ca.MX:
         return ca.MX(self.weight / 2 * ca.sumsqr(self.away))
+
+
+def regularised_hessian(hess_lag: ca.Function) -> ca.Function:
+    """(x, p, lam_f, lam_g) -> upper triangle (n, n) of the regularised Hessian."""
+    at = hess_lag.mx_in()
+    hessian = hess_lag(*at) + Newton.current().regularisation * ca.MX.eye(hess_lag.size1_out(0))
+    return ca.Function("hess_lag", at, [hessian], hess_lag.name_in(), hess_lag.name_out())

@@ -12,13 +12,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.problem import Derivatives
-from kemba.ocp.functions.proximal import Proximal
-from kemba.ocp.functions.regularised import regularised_hessian
+from kemba.ocp.functions.problem import Derivatives, Program
+from kemba.ocp.functions.proximal import Proximal, regularised_hessian
 from kemba.ocp.functions.settings import Newton
-from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.program import Program
-from kemba.ocp.nlp.stagnation import Stagnation
+from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.watcher import Watch, Watcher
 from kemba.stopwatch import Stopwatch
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.nlp.program import Program, violation
-from kemba.ocp.nlp.stagnation import Stagnation
+from kemba.ocp.functions.problem import Program, violation
+from kemba.ocp.nlp.ending import Stagnation
 
 Watch = Callable[[int, float, float], None]  # iteration, objective, worst scaled violation
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from kemba.ocp.phases.program import View
 from kemba.ocp.phases.settings import ModeConstraints
-from kemba.ocp.phases.view import View
 
 AGREES = 1e-4  # of a scaled quantity; a dependent equality with another value contradicts the rest
 STEPS = 10  # of Gauss and Newton to a point on the equalities

@@ -10,10 +10,9 @@ import numpy as np
 from kemba.model.impact import felt
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
-from kemba.ocp.phases.program import PhaseProgram, Where
+from kemba.ocp.phases.program import PhaseProgram, View, Where
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
-from kemba.ocp.phases.view import View
 from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.transcription.first_node import state_rows
 from kemba.ocp.transcription.unilateral import Constraint, Friction

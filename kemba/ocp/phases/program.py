@@ -14,7 +14,7 @@ from kemba.model import Model
 from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
 from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import OPEN, Phase
-from kemba.ocp.phases.radau import STATE, Scheme, element, impact
+from kemba.ocp.phases.radau import STATE, Scheme, element, impact, node_vector, scaled
 from kemba.ocp.phases.settings import Elements
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -275,3 +275,24 @@ class PhaseProgram:
     def g_upper(self) -> np.ndarray:
         """Upper bounds (rows,) of the rows."""
         return np.array([row.upper for row in self.rows])
+
+
+class View:
+    """The node's expressions as functions of scaled half symbols q, v, s, u, lam."""
+
+    def __init__(self, program: PhaseProgram) -> None:
+        self.layout, self.node = program.layout, program.model.node
+        groups = ("q", "v", "s", "u", "lam")
+        self.symbols = {g: scaled(self.layout, g, g) for g in groups}
+        y = node_vector(self.layout, self.symbols)
+        self._full = [ca.densify(self.layout.full(y, g)) for g in groups]
+
+    def of(self, expression: ca.SX) -> ca.SX:
+        """An expression of the node's symbols in the half ones."""
+        node = self.node
+        symbols = [node.q, node.v, node.s, node.u, node.lam]
+        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, self._full)[0])))
+
+    def z(self, groups: str) -> ca.SX:
+        """The symbols of some groups as one vector; `groups` such as "q v"."""
+        return ca.vertcat(*(self.symbols[g] for g in groups.split()))

@@ -9,8 +9,7 @@ import numpy as np
 
 from kemba.ocp.phases.independent import ContradictionError, Independent
 from kemba.ocp.phases.modes import HELD
-from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.view import View
+from kemba.ocp.phases.program import PhaseProgram, View
 from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
 from kemba.ocp.transcription.stage import aim_cost, as_variable, tighter_bounds
 

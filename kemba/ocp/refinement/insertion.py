@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from kemba.ocp.nlp.ending import Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.settings import Refining

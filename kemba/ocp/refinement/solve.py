@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from kemba.ocp.nlp.ending import Stagnation
 from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate
-from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.settings import Refining
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Bounds, Iterate, warm
-from kemba.ocp.nlp.stagnation import Stagnation
 from kemba.ocp.relaxation.session import Schedule
-from kemba.ocp.relaxation.settings import Ends, Grids, Relaxation, Starts
+from kemba.ocp.relaxation.settings import Ends, Grids, Penalty, Relaxation, Starts
 from kemba.ocp.transcription.parameters import Parameters
+from kemba.ocp.transcription.stage import COST_SCALE
 from kemba.ocp.transcription.transcribe import Transcription
 
 RELAX = "relax"  # the name of a schedule's first solve
@@ -144,3 +144,17 @@ def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.nda
         else:
             result[:, part] = Y[held, part]
     return result
+
+
+METHODS = {"penalty": "single", "penalty_ramped": "ramp"}  # and the setting with their weights
+
+
+def penalise(schedule: Schedule, start: Iterate, method: str) -> Iterate:
+    """Solve with penalised pairs and valves; each step of a ramp starts from the last."""
+    task, point, settings = schedule.transcription.task, start, Penalty.current()
+    for number, rho in enumerate(getattr(settings, METHODS[method])):
+        weight = rho * task.step / COST_SCALE
+        parameters = Parameters(settings.unrelaxed, valve=weight * task.nodes, pairs=weight)
+        options = warm(settings.ramp_mu) if number else {}
+        point = schedule.solve(f"penalty, rho = {rho:g}", point, parameters, options=options)
+    return point

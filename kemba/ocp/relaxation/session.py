@@ -8,11 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from kemba.ocp.nlp.ending import Ending
+from kemba.ocp.functions.problem import violation
+from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Bounds, Control, Ipopt, Iterate
-from kemba.ocp.nlp.program import violation
-from kemba.ocp.nlp.stagnation import Stagnation
-from kemba.ocp.relaxation.dwell import dwelling
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.stopwatch import Stopwatch
@@ -147,3 +145,21 @@ def _regularised(t: Transcription, parameters: Parameters) -> bool:
     """
     has_pairs = any(rows.kind == "pair" for rows in t.stage.rows)
     return has_pairs and not t.reduction.symmetric and not parameters.pairs
+
+
+def dwelling(u: np.ndarray, h: np.ndarray, least: float) -> np.ndarray:
+    """A rounded valve (nodes + 1,) without pulses shorter than `least` [s]; `h` (nodes,) [s].
+
+    A pulse that is too short is filled in, the shortest first.
+    """
+    u = np.round(np.clip(u, 0.0, 1.0))
+    while True:
+        edges = np.flatnonzero(np.diff(u)) + 1
+        if len(edges) < 2:
+            return u
+        ends = np.concatenate([[0.0], np.cumsum(h)])
+        spans = ends[edges[1:] - 1] - ends[edges[:-1] - 1]
+        i = int(np.argmin(spans))
+        if spans[i] >= least - 1e-9:
+            return u
+        u[edges[i] : edges[i + 1]] = 1.0 - u[edges[i]]

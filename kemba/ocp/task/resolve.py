@@ -16,12 +16,11 @@ from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.model import Model
 from kemba.ocp.task.costs import COSTS
 from kemba.ocp.task.expressions import expressed, is_expression, two_moments
-from kemba.ocp.task.height import with_height
 from kemba.ocp.task.moments import share_of
 from kemba.ocp.task.options import option_errors, timing_errors
 from kemba.ocp.task.requirement import Earlier, Requirement, quantities, quantity_expression
 from kemba.ocp.task.task import Bound, CostTerm, Goal, Moment, Task
-from kemba.ocp.task.templates import TEMPLATES
+from kemba.ocp.task.templates import TEMPLATES, with_height
 from kemba.ocp.task.terrain import rooms, scene_errors
 from kemba.quantity import Quantity, to_si
 

@@ -18,7 +18,7 @@ p   (5,): relaxation of the pairs and four weights (see `parameters`)
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -26,10 +26,10 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.model.impact import felt
 from kemba.ocp.functions.blocks import RowBlock, block_problem
-from kemba.ocp.task.requirement import Requirement, apex_node, quantity_expression
+from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.approach import approach_rows
 from kemba.ocp.transcription.first_node import Held, granted, state_rows
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
 from kemba.ocp.transcription.stage import (
@@ -43,6 +43,7 @@ from kemba.ocp.transcription.stage import (
     tighter_bounds,
 )
 from kemba.ocp.transcription.symmetry import Reduction
+from kemba.ocp.transcription.unilateral import rigid_constraints
 
 WITHIN = (0.25, 0.5, 0.75)  # of an interval: where obstacles are looked at besides its end
 RequirementBlock = tuple[RowBlock, StageRows, list[int]]  # with the nodes at which its rows hold
@@ -297,3 +298,32 @@ def _meanings(rows: StageRows, node: int) -> list[Meaning]:
         Meaning(rows.kind, label, unit, scale, node)
         for label, unit, scale in zip(rows.labels, rows.units, rows.scales, strict=True)
     ]
+
+
+SPEED = SCALES["m.s-1"]
+
+
+def approach_rows(
+    model: Model,
+    reduction: Reduction,
+    stage: Interval,
+    of_state: Callable[[ca.SX], ca.SX],
+    speed: float,
+    step: float,
+) -> StageRows:
+    """Rows of an interval: a gap that closes in it was closing at most at `speed` [m/s].
+
+    rate(y0) + gap(y) / step >= -speed, stops by the length of the leg (`felt`). Where the gap stays
+    open by more than it closes within a `step` [s], the row asks for nothing. `of_state`: an
+    expression of the node in the stage's y. Feet on a ground that gives way have no rows: it stops
+    them, however fast they come.
+    """
+    rows, labels = [], []
+    for constraint in rigid_constraints(model, reduction):
+        rate = ca.substitute(of_state(constraint.rate), stage.y, stage.y0)
+        own = felt(model.mechanism, constraint.label)
+        rows.append(own * (rate + of_state(constraint.gap) / step) / SPEED)
+        labels.append(f"landing.impact_speed:{constraint.label}")
+    units, scales = ("m.s-1",) * len(rows), (SPEED,) * len(rows)
+    low = -speed / SPEED
+    return StageRows("requirement", ca.vertcat(*rows), low, INF, tuple(labels), units, scales)
