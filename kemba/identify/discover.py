@@ -15,7 +15,14 @@ from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_alias
 from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
 from kemba.identify.infer.residual import drifting, rest_of
 from kemba.identify.infer.search import Search, SearchSettings
-from kemba.identify.infer.selection import Selection, material, predictive, quoted, selected
+from kemba.identify.infer.selection import (
+    Selection,
+    certain,
+    material,
+    predictive,
+    quoted,
+    selected,
+)
 from kemba.identify.infer.significance import NullTest, best_gain, null_test, smallest_detectable
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.structure import (
@@ -138,6 +145,11 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     whole = predictive(search, selection.best, likeliest) if selection.best else NULL
     whole = without_figure_aliases(search.problem, whole, search.points[whole].fit.theta)
     selection, whole = quoted(search, selection, whole, kept)
+    joint = None
+    if whole:
+        search.say("fitting all that was found together")
+        joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
+        selection = certain(selection, joint, search.problem)
     best, p_value, ended = selection.best, selection.p_value, ended or search.late
     for hypothesis in filter(None, (best, whole)):
         search.visit(hypothesis)
@@ -152,11 +164,9 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     caveats = Caveats((ENDED,) if ended else ())
     if formula is None:
         caveats = caveats_of(search, selection, drift, kept, ended)
-    search.say("fitting all that was found together")
-    joint = None
-    if whole and verdict_on(best, formula, caveats) in WRITTEN:
-        joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
-    elif not best and formula is None and not caveats.reasons:
+    if whole and verdict_on(best, formula, caveats) not in WRITTEN:
+        joint = None
+    if not best and formula is None and not caveats.reasons:
         joint = joint_fit(search.problem, NULL, search.points[NULL].fit.theta)
     whole = whole if joint else best
     search.say("ranking the effects")

@@ -139,6 +139,14 @@ class JointFit:
         rows = self.covariance[np.ix_(keep, keep)].tolist()
         return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows))) if rows else None
 
+    def holds_absence(self, candidate: Candidate) -> bool:
+        """Whether the interval of one effect's leading parameter holds its absence."""
+        key, off = candidate.key, candidate.lead.off
+        if key not in self.names or not np.isfinite(off):  # not fitted, or told by a reciprocal
+            return False
+        i = self.names.index(key)
+        return bool(self.low[i] <= off <= self.high[i])
+
     def values(self, candidate: Candidate) -> dict[str, Value]:
         """The parameters of one effect, as the catalogue has them."""
         found = {}

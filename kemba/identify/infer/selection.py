@@ -29,11 +29,12 @@ from kemba.identify.infer.cross_validation import (
     window_gain,
     window_powers,
 )
-from kemba.identify.infer.joint import joint_estimate
+from kemba.identify.infer.joint import JointFit, joint_estimate
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import BootstrapSettings
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior
 from kemba.identify.infer.windows import error_ratio
+from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import is_fault
 
 # of what a larger answer leaves beyond the noise, what it must explain more: a tenth; 0.18
@@ -320,6 +321,14 @@ def quoted(
     return (
         replace(selection, best=best) if best else _nothing_selected(selection)
     ), whole if best else ()
+
+
+def certain(selection: Selection, joint: JointFit, problem: Problem) -> Selection:
+    """The selection without effects that its joint fit leaves room to be absent, as long as any is
+    left: they are likely, and not sure. Whether there is anything is asked by the bootstrap."""
+    candidates = (problem.candidates[e] for e in selection.best)
+    best = tuple(c.effect for c in candidates if not joint.holds_absence(c))
+    return replace(selection, best=best) if best else selection
 
 
 def _joint(search: Search, hypothesis: Hypothesis) -> dict[str, float]:

@@ -8,10 +8,12 @@ from toy_problem import Toy
 
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
+from kemba.identify.infer.joint import JointFit
 from kemba.identify.infer.ranking import equivalents
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import (
     Selection,
+    certain,
     likeliest_part,
     overclaimed,
     selected,
@@ -151,3 +153,15 @@ def test_a_small_gain_that_lasts_stays_though_it_is_within_its_scatter(seed: int
     assert 0.0 < gain.nats < gain.error
     selection = Selection(("bend", "kick"), 0.01)
     assert simplest(search, selection) == selection
+
+
+@pytest.mark.parametrize(("lower", "named"), [(0.1, ("hum", "kick")), (-0.1, ("kick",))])
+def test_an_effect_whose_interval_holds_its_absence_is_not_sure(
+    lower: float, named: Hypothesis
+) -> None:
+    problem = Toy({"kick.a": 9.0, "hum.a": 0.5})
+    low, value, high = np.array([[8.0, lower], [9.0, 0.5], [10.0, 1.0]])
+    joint = JointFit({}, ("kick.a", "hum.a"), value, low, high, np.eye(2))
+    assert certain(Selection(("hum", "kick"), 0.01), joint, problem).best == named
+    alone = Selection(("hum",), 0.01)
+    assert certain(alone, joint, problem) == alone, "whether there is anything is asked elsewhere"
