@@ -21,14 +21,14 @@ INF = np.inf
 LENGTH, SPEED = SCALES["m"], SCALES["m.s-1"]  # of gaps and their rates
 
 
-def add_mode_constraints(program: PhaseProgram, start: Independent, end: Independent) -> None:
+def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
     """Add the rows of every mode in every phase and at every impact.
 
-    `start`, `end`: the equalities that the task already asks for at the first and the last node.
+    `start`: the equalities that the task already asks for at the first node.
     """
     view = View(program)
     for i, constraint in enumerate(program.constraints):
-        _gaps(program, view, i, constraint, end)
+        _gaps(program, view, i, constraint)
         _held(program, view, i, constraint)
         _friction(program, view, i, constraint)
         _start(program, view, i, constraint, start)
@@ -37,25 +37,20 @@ def add_mode_constraints(program: PhaseProgram, start: Independent, end: Indepen
     _durations(program)
 
 
-def _gaps(
-    program: PhaseProgram, view: View, i: int, constraint: Constraint, end: Independent
-) -> None:
+def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
     """Open gaps stay positive; where one closes it is zero, and a foot moves downwards."""
     c, phases = program.columns, program.phases
     settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
-    asked = [program.nodes] if end.grants(view.of(constraint.gap), view) else []
-    touched = {*closing, *asked}  # there the gap is an equality
     closed = np.array([phases[p].active(i) for p in c.phase_of])
     near = max(settings.away, round(settings.away_share * program.nodes))
-    around = np.append(closed, True)  # what the task asks of the end may close a gap there
-    away = np.convolve(around, np.ones(2 * near + 1), "same")[:-1] < 1  # of a closed element
+    away = np.convolve(closed, np.ones(2 * near + 1), "same") < 1  # of a closed element
     g = view.of(constraint.gap) / LENGTH
     for clear in (False, True):
         apart: Where = [
             (c.phase_of[e], stage["q"])
             for e in np.flatnonzero(~closed & (away == clear))
-            for stage in (c.stages[e][:-1] if e + 1 in touched else c.stages[e])
+            for stage in (c.stages[e][:-1] if e + 1 in closing else c.stages[e])
         ]
         low = settings.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)

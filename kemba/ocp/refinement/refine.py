@@ -287,7 +287,7 @@ class Refiner:
         at_first = Independent({g: x[first[g]] for g in STATE})
         at_last = Independent({g: x[end[g]] for g in STATE})
         add_requirements(program, self.requirements, at_first, at_last)
-        add_mode_constraints(program, at_first, at_last)
+        add_mode_constraints(program, at_first)
         x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
         return program, np.clip(x, program.lower, program.upper)
 
