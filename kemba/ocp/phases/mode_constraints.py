@@ -94,7 +94,7 @@ def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     settled = {tuple(z) for _, z in settling}
     for wanted, low, high in sets:
         own = [(p, z) for p, z in states if phases[p].modes[i] == wanted]
-        where = own if wanted == HELD else [(p, z) for p, z in own if tuple(z) not in settled]
+        where = [(p, z) for p, z in own if tuple(z) not in settled]
         program.mode_constraint(i, "slip", view.z("q v"), slip, low, high, where)
     program.mode_constraint(i, "settles", view.z("q v"), slip, 0.0, 0.0, settling)
 
