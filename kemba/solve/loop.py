@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent
 from kemba.ocp.starts import plan_best

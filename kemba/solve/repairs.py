@@ -8,7 +8,7 @@ from dataclasses import replace
 from kemba.ocp import Plan
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.continued import dear
 from kemba.ocp.planning import Planning
 from kemba.solve.trial import Trial, TrialOrder, executed

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kemba.model import Model, load_model
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.controller import PERIOD
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.ticks import edge_times
