@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.effects.mechanics.motor import Motor
+from kemba.effects.mechanics.hip import Motor
 from kemba.errors import KembaError
 from kemba.events import STANDS
 from kemba.model import Model

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from kemba.effects.mechanics.friction import SealFriction
 from kemba.effects.mechanics.load import Payload
+from kemba.effects.mechanics.piston import SealFriction
 from kemba.model import load_model
 from kemba.ocp.continuation.between import completed, model_between, requirements_between
 from kemba.ocp.continuation.continue_plan import with_impacts

@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.effects.mechanics.contact import Contact
+from kemba.effects.mechanics.ground import Contact
 from kemba.events import LASTS, PLANNED, read
 from kemba.model import Model
 from kemba.model.impact import felt
