@@ -8,28 +8,12 @@ from math import ceil, exp, floor
 
 import numpy as np
 
-from kemba.settings import Settings, setting
-
-BY_HAND = "tuned: by hand on jump, jump_forward and max_jump, no benchmark"
-
-
-class EdgeSettings(Settings):
-    """How valve edges are rounded to the ticks of the controller."""
-
-    forget: float = setting(
-        100.0, "ticks", "time in which an impulse error fades; a stance lasts 100 to 300", BY_HAND
-    )
-    moves: float = setting(
-        20.0,
-        "ticks",
-        "impulse errors that last shorter hardly count",
-        "derived: a chamber's rise time",
-    )
-    shift: float = setting(0.1, "1", "weight of an edge's own error", BY_HAND)
-    snap: float = setting(
-        1e-6, "ticks", "an edge this near to a tick is on it", "derived: rounding of times in s"
-    )
-    kept: int = setting(1000, "1", "partial choices that are kept at each edge", BY_HAND)
+# by hand on jump, jump_forward and max_jump, no benchmark
+FORGET = 100.0  # ticks in which an impulse error fades; a stance lasts 100 to 300
+MOVES = 20.0  # ticks: impulse errors that last shorter than a chamber's rise hardly count
+SHIFT = 0.1  # weight of an edge's own error
+SNAP = 1e-6  # ticks; an edge this near to a tick is on it
+KEPT = 1000  # partial choices that are kept at each edge
 
 
 @dataclass(frozen=True)
@@ -52,13 +36,13 @@ class _Choices:
     latest: np.ndarray
     impulse: np.ndarray
 
-    def lasting(self, time: float, limits: EdgeSettings) -> _Choices:
+    def lasting(self, time: float) -> _Choices:
         """The choices after `time` without an edge."""
         own = self.impulse**2
         i, j = np.triu_indices(self.impulse.shape[1], 1)
         turning = (self.impulse[:, i] - self.impulse[:, j]) ** 2
-        spent = (1.0 - exp(-time / limits.moves)) * (own.sum(axis=1) + turning.sum(axis=1))
-        impulse = exp(-time / limits.forget) * self.impulse
+        spent = (1.0 - exp(-time / MOVES)) * (own.sum(axis=1) + turning.sum(axis=1))
+        impulse = exp(-time / FORGET) * self.impulse
         return replace(self, cost=self.cost + spent, impulse=impulse)
 
     def of(self, which: np.ndarray) -> _Choices:
@@ -97,7 +81,6 @@ def rounded(valves: Sequence[ValveEdges]) -> list[list[int]]:
     also between valves, and those of one valve stay a tick apart. Edges are decided in order of
     time; the best partial choices are kept at each.
     """
-    limits = EdgeSettings.current()
     wanted = [_apart(valve.edges) for valve in valves]
     order = sorted((time, v, k) for v, edges in enumerate(wanted) for k, time in enumerate(edges))
     legs = 1 + max((valve.leg for valve in valves), default=0)
@@ -106,17 +89,17 @@ def rounded(valves: Sequence[ValveEdges]) -> list[list[int]]:
     at = [-1.0] * len(valves)  # when the latest edge of each valve was wanted
     for time, v, k in order:
         sign = valves[v].force * (-1.0 if k % 2 == 0 else 1.0)  # opening late takes, closing adds
-        earlier = [u for u, before in enumerate(at) if u == v or before < time - limits.snap]
-        waited = best.lasting(time - now, limits)
+        earlier = [u for u, before in enumerate(at) if u == v or before < time - SNAP]
+        waited = best.lasting(time - now)
         low = (waited.latest + (np.arange(len(valves)) == v))[:, earlier].max(axis=1)
         new = [
             waited.of(tick >= low).at(
-                tick, v, valves[v].leg, sign * (tick - time), limits.shift * (tick - time) ** 2
+                tick, v, valves[v].leg, sign * (tick - time), SHIFT * (tick - time) ** 2
             )
-            for tick in sorted({floor(time + limits.snap), ceil(time - limits.snap)})
+            for tick in sorted({floor(time + SNAP), ceil(time - SNAP)})
         ]
-        best, now, at[v] = _joined(new).best(limits.kept), time, time
-    chosen = best.lasting(limits.forget, limits)
+        best, now, at[v] = _joined(new).best(KEPT), time, time
+    chosen = best.lasting(FORGET)
     ticks: list[list[int]] = [[0] * len(edges) for edges in wanted]
     for (_, v, k), tick in zip(order, chosen.ticks[np.argmin(chosen.cost)], strict=True):
         ticks[v][k] = int(tick)

@@ -45,6 +45,9 @@ from kemba.trajectory import Array, Trajectory
 TRIED = "tuned: jump and jump_forward with other heights, supplies, payloads and distances"
 
 
+EASE = 1e3  # how much rather impulses of the start change than its velocities, scaled
+
+
 class Continuing(Settings):
     """How an earlier plan is solved again for changed figures."""
 
@@ -66,10 +69,6 @@ class Continuing(Settings):
     underway: float = setting(
         0.5, "1", "scaled violation below which a solve is no longer given up for that", TRIED,
         decides=True,
-    )  # fmt: skip
-    ease: float = setting(
-        1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
-        "convention: a trajectory says nothing of impulses",
     )  # fmt: skip
     push: float = setting(
         1e-3, "1", "distance from the bounds of such a start", TRIED, decides=True
@@ -263,7 +262,7 @@ class Continuation:
         program, x = refiner.build(phases, start, RADAU5)
         stages = self.solution
         kept = on_elements(program, stages) if stages is not None else None
-        x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
+        x = with_impacts(program, x, EASE) if kept is None else kept
         if self.origin.ticks:
             on_ticks(program, x)
         known = kept is not None

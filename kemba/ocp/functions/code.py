@@ -20,6 +20,8 @@ from kemba.instructions import replay
 from kemba.ocp.functions.settings import Functions
 from kemba.ocp.functions.signs import canonical_signs
 
+FEW = 8  # points at which evaluating one by one is as fast as all at once
+
 
 @dataclass(frozen=True, eq=False)
 class Code:
@@ -142,7 +144,7 @@ def parameterised(
 def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:
     """f of SX at `points` at once: its inputs (n, points), except the `shared` ones (n,), which
     are the same at all; dense outputs (m, points). Equal to f at every point to the last bit."""
-    if points < Functions.current().few or f.class_name() != "SXFunction":
+    if points < FEW or f.class_name() != "SXFunction":
         return f.map(f.name(), "serial", points, list(shared), [])
     widths = [1 if i in shared else points for i in range(f.n_in())]
     inputs = [ca.MX.sym(f.name_in(i), f.numel_in(i), w) for i, w in enumerate(widths)]

@@ -14,14 +14,6 @@ class Newton(Settings):
         2e-3, "1", "multiple of the identity in the Hessian of whole robots, per scaled variable; "
         "IPOPT's own additions are 1e-4 to 1", VARIANTS, decides=True,
     )  # fmt: skip
-    memory: int = setting(
-        100, "1", "mumps_mem_percent: room beyond what MUMPS expects to need [%]; by default it "
-        "asks for eleven times as much at every factorisation", VARIANTS,
-    )  # fmt: skip
-    warm_push: float = setting(
-        1e-6, "1", "distance from the bounds of a warm start, and least multiplier",
-        "convention: small beside every scaled variable",
-    )  # fmt: skip
     progress: float = setting(
         0.8, "1", "part of the violation that may be left for a solve to count as progressing",
         "convention: a fall by a fifth", decides=True,
@@ -31,14 +23,6 @@ class Newton(Settings):
 class Functions(Settings):
     """How the functions for IPOPT are made."""
 
-    few: int = setting(
-        8, "1", "points at which evaluating one by one is as fast as all at once",
-        "tuned: timed when written, code not kept",
-    )  # fmt: skip
-    problems: int = setting(
-        8, "1", "programs that are kept for equal ones of the process",
-        "convention: twice those of a plan that is continued",
-    )  # fmt: skip
     kept: int = setting(
         400, "1", "blocks whose functions are kept for the next program of the process",
         "convention: twice the blocks of all programs of a jump",

@@ -29,6 +29,11 @@ from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
 # What may be violated: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end", "clearance"))
 
+BUDGET = 30.0  # s; a user waits no longer for an explanation
+ITERATIONS = 500  # of one solve: bounded, since it only explains
+CHEAP = 0.01  # factor on the task's costs: far below the price of slack
+ROOM = 0.1  # scaled slack of the start guess: off the bounds, in the range of answers
+
 
 class Elastic(Transcription):
     """A transcription whose requirements of the sections `soft` may be violated.
@@ -48,8 +53,7 @@ class Elastic(Transcription):
     ) -> None:
         self.soft = soft
         self.slack: list[tuple[Requirement, int, float]] = []  # requirement, first column, scale
-        factor = ElasticSolve.current().cheap
-        cheap = scaled(task.cost, factor)
+        cheap = scaled(task.cost, CHEAP)
         super().__init__(
             model, task.model_copy(update={"cost": cheap}), requirements, reduction, nodes
         )
@@ -104,7 +108,7 @@ class Elastic(Transcription):
         """
         wide = np.zeros(self.shape)
         wide[:, : self.layout.size] = Y
-        wide[0, self.layout.size :] = ElasticSolve.current().room
+        wide[0, self.layout.size :] = ROOM
         return wide
 
     def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
@@ -144,7 +148,7 @@ def elastic(
 
     Raises Stopped when the user stopped it.
     """
-    deadline = min(session.control.deadline, time.monotonic() + ElasticSolve.current().budget)
+    deadline = min(session.control.deadline, time.monotonic() + BUDGET)
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}
     nodes = min(task.nodes, ElasticSolve.current().nodes)
@@ -177,7 +181,7 @@ def _tiers(task: Task) -> Iterator[tuple[Task, Sequence[str]]]:
 
 def _solve(program: Elastic, session: Session) -> Outcome | None:
     """The usual schedule; the last step that converged counts."""
-    options = {**program.task.solver.options, "max_iter": ElasticSolve.current().iterations}
+    options = {**program.task.solver.options, "max_iter": ITERATIONS}
     schedule = session.schedule(program, options)
     converged: list[Iterate] = []
     try:
