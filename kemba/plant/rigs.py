@@ -376,12 +376,7 @@ class RigFile(Section):
 
 def load_rig(name: str | Path) -> Rig:
     """The rig of a YAML file, or a shipped one. Raises KembaError with every mistake."""
-    return parse_rig(load_yaml(find_config(name, "rigs")))
-
-
-def parse_rig(document: Document) -> Rig:
-    """The rig a document describes. Raises KembaError with every mistake."""
-    return parse(document, RigFile).rig
+    return parse(load_yaml(find_config(name, "rigs")), RigFile).rig
 
 
 def bench_model(name: str | Path, supply: float) -> Model:

@@ -363,7 +363,11 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
         parts.append(folded("Plan in numbers", f'<div class="facts">{facts}</div>', not given.logs))
         parts += list(origin(given.run))
     if tracks:
-        parts.append(_scripts(book))
+        parts.append(
+            f"<style>{page_text('uplot.min.css')}</style>\n"
+            f"<script>/*!\n{page_text('uplot.LICENSE')}\n*/\n{page_text('uplot.min.js')}</script>\n"
+            f"<script>{page_text('charts.js')}charts({book.data()});</script>"
+        )
     return _title(given), "\n".join(part for part in parts if part), verdict
 
 
@@ -466,12 +470,3 @@ def _title(given: Material) -> str:
     if given.answer:
         parts.append(given.answer_folder.resolve().name)
     return " · ".join(parts)
-
-
-def _scripts(book: Book) -> str:
-    """The library with its licence notice, our script and the numbers."""
-    return (
-        f"<style>{page_text('uplot.min.css')}</style>\n"
-        f"<script>/*!\n{page_text('uplot.LICENSE')}\n*/\n{page_text('uplot.min.js')}</script>\n"
-        f"<script>{page_text('charts.js')}charts({book.data()});</script>"
-    )

@@ -70,7 +70,9 @@ class BenchProblem(ColouredProblem):
         if sensors:
             self.candidates |= sensor_candidates(_sensor_sigmas(logs), model)
         row = max(log.seen_within for log in logs)
-        hidden = {n: c for n, c in self.candidates.items() if _within(c, row)}
+        hidden = {
+            n: c for n, c in self.candidates.items() if c.lead.unit == "s" and c.lead.size < row
+        }
         self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
         predictor = BenchPredictor(model, self.candidates)
         states = predictor.at({}).state_names
@@ -239,11 +241,6 @@ def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     return BenchProblem(
         [clocks.without_drift(run, *drift) for run in runs(logs)], model, drift=drift
     )
-
-
-def _within(candidate: Candidate, row: float) -> bool:
-    """Whether an effect is a time that does not show in logs with a row every `row` [s]."""
-    return candidate.lead.unit == "s" and candidate.lead.size < row
 
 
 def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:

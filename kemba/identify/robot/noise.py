@@ -31,18 +31,13 @@ from kemba.identify.robot.filter import FilterGains, System, innovations
 Noise = Sequence[ChannelNoise]  # one per channel; empty: all are white
 
 
-def _is_white(noise: Noise) -> bool:
-    """Whether no channel has a lag, nor another sigma than the stated one."""
-    return all(channel == ChannelNoise() for channel in noise)
-
-
 def coloured(system: System, noise: Noise, sigma: Array, h: Array) -> System:
     """The filter's system with every lag of `noise` as one more state.
 
     `system`: white, with the channels as its first rows; `sigma` (L, m): stated noise of each run's
     channels; `h` (n, L) [s]: length of each step.
     """
-    if _is_white(noise):
+    if all(channel == ChannelNoise() for channel in noise):
         return system
     lags = [(i, s, memory) for i, c in enumerate(noise) for s, memory in c.lags]
     n, runs, m, d = system.H.shape
