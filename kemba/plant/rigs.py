@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from kemba.config import Document, FileName, Section, find_config, load_yaml, parse
+from kemba.config import FileName, Section, find_config, load_yaml, parse
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.model.rest import at_rest

@@ -29,7 +29,6 @@ from kemba.identify.problem.candidates import effect_candidates, sensor_candidat
 from kemba.identify.problem.noise import ColouredProblem, colours, whiten
 from kemba.identify.problem.types import (
     Array,
-    Candidate,
     Changes,
     ForceChannel,
     Leftover,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kemba.ocp.nlp.ending import Ending, Stagnation
-from kemba.ocp.nlp.ipopt import Bounds, Iterate, warm
+from kemba.ocp.nlp.ipopt import WARM_PUSH, Bounds, Iterate, warm
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.relaxation.settings import Ends, Grids, Relaxation, Starts
 from kemba.ocp.transcription.parameters import Parameters
