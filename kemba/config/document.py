@@ -137,18 +137,17 @@ def load_yaml(path: str | Path) -> Document:
     Raises KembaError when the file cannot be read, is not YAML or is larger than 2 MB, and
     ConfigErrors listing all keys that occur twice.
     """
-    largest = LARGEST
     try:
         with Path(path).open("rb") as stream:
-            content = stream.read(largest + 1)
+            content = stream.read(LARGEST + 1)
         text = content.decode("utf-8-sig")
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except UnicodeDecodeError:
-        if len(content) <= largest:
+        if len(content) <= LARGEST:
             raise KembaError(str(path), "is not a UTF-8 text", "a YAML file was expected") from None
-    if len(content) > largest:
-        raise KembaError(str(path), f"is larger than {largest} bytes", "a YAML file was expected")
+    if len(content) > LARGEST:
+        raise KembaError(str(path), f"is larger than {LARGEST} bytes", "a YAML file was expected")
     return load_text(text, str(path))
 
 

@@ -132,14 +132,13 @@ class BenchProblem(ColouredProblem):
         return columns
 
     def rows(self) -> Rows:
-        rest = REST
         parts: list[tuple[np.ndarray, ...]] = []
         for i in range(len(self.logs)):
             log = self.logs[i]
             for c in log.measured:
                 keep = log.keep[c]
                 n, k = int(keep.sum()), self.channels.index(c)
-                label = np.where(np.abs(log.motion.v[keep]) < rest, "rest", "moving")
+                label = np.where(np.abs(log.motion.v[keep]) < REST, "rest", "moving")
                 one = (np.full(n, i), np.full(n, k), log.motion.time[keep], label, log.mode[keep])
                 parts.append((*one, np.full(n, log.sigma[c])))
         run, channel, time, phase, mode, sigma = (

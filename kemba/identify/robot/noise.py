@@ -91,11 +91,10 @@ def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
     rng = np.random.default_rng(seed)
     y = simulated(system, DRAWS, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
-    width = WIDTH
-    padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
+    padded = np.pad(power, ((WIDTH // 2, WIDTH // 2), (0, 0), (0, 0)), mode="edge")
     total = np.cumsum(padded, axis=0)
     total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
-    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, LEAST))
+    return np.asarray(np.maximum((total[WIDTH:] - total[:-WIDTH]) / WIDTH, LEAST))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:
