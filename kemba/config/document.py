@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, WithJsonSchema
 
-from kemba.config.reader import LARGEST, PATTERNS, Location, Mark, YamlError, read
+from kemba.config.reader import LARGEST, PATTERNS, Mark, YamlError, read
+from kemba.config.reader import Location as Location
 from kemba.errors import ConfigErrors, KembaError
 from kemba.files import atomic_text
 
@@ -75,8 +76,6 @@ def _text(dumper: Any, value: str) -> Any:
     style = '"' if set(value) & set("\x85\u2028\u2029") or value == "<<" else None
     return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
 
-
-__all__ = ["Document", "Location", "dump_text", "dump_yaml", "load_text", "load_yaml", "written"]
 
 WIDE = 160  # characters of a line that are shown
 TIGHT = re.compile(r"\s*[\w*/.-]+:[^\s/]")  # `height:0.5 m`, which YAML reads as one word

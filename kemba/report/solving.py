@@ -22,10 +22,10 @@ from typing import Any
 from kemba.config import Document, dump_yaml
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
-from kemba.files import WriteError
+from kemba.files import WriteError, write_json
 from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.between import write_stages
-from kemba.runs import PLANT_RUN, STAGES, RunFolder, write_json
+from kemba.runs import PLANT_RUN, STAGES, RunFolder
 from kemba.solve import Approach, best_plan
 from kemba.solve.listener import Listener
 from kemba.solve.memory import remember
