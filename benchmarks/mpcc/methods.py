@@ -8,7 +8,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.settings import Newton
+from kemba.ocp.functions.proximal import Newton
 from kemba.ocp.mpcc.solve import solve_mpcc
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate, warm
 from kemba.ocp.relaxation.schedule import exact, interior

@@ -9,9 +9,8 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
-from kemba.ocp.functions.code import Code, code_of, vectorised
-from kemba.ocp.functions.proximal import Proximal, regularised_hessian
-from kemba.ocp.functions.settings import Functions, Newton
+from kemba.ocp.functions.code import Code, Functions, code_of, vectorised
+from kemba.ocp.functions.proximal import Newton, Proximal, regularised_hessian
 from kemba.ocp.functions.signs import canonical_signs
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry

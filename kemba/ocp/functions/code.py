@@ -17,10 +17,19 @@ import numpy as np
 
 from kemba.cache import Recent
 from kemba.instructions import replay
-from kemba.ocp.functions.settings import Functions
 from kemba.ocp.functions.signs import canonical_signs
+from kemba.settings import Settings, setting
 
 FEW = 8  # points at which evaluating one by one is as fast as all at once
+
+
+class Functions(Settings):
+    """How the functions for IPOPT are made."""
+
+    kept: int = setting(
+        400, "1", "blocks whose functions are kept for the next program of the process",
+        "convention: twice the blocks of all programs of a jump",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.functions.blocks import RowBlock
-from kemba.ocp.infeasibility.settings import ElasticSolve
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.guess import automatic_guess
@@ -25,6 +24,7 @@ from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import StageRows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
+from kemba.settings import Settings, setting
 
 # What may be violated: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end", "clearance"))
@@ -33,6 +33,23 @@ BUDGET = 30.0  # s; a user waits no longer for an explanation
 ITERATIONS = 500  # of one solve: bounded, since it only explains
 CHEAP = 0.01  # factor on the task's costs: far below the price of slack
 ROOM = 0.1  # scaled slack of the start guess: off the bounds, in the range of answers
+
+
+class ElasticSolve(Settings):
+    """The solve in which requirements may be violated."""
+
+    nodes: int = setting(
+        40, "1", "of its grid at most; a coarse one is enough to say what is too much",
+        "convention: bounded, since it only explains", decides=True,
+    )  # fmt: skip
+    price: float = setting(
+        100.0, "1", "of one unit of scaled slack, beside a cost of 0.01 to 10",
+        "derived: above every cost of the task, so that no violation pays", decides=True,
+    )  # fmt: skip
+    short: float = setting(
+        0.05, "1", "scaled slack (5 mm, 0.6 deg) from which a requirement is out of reach",
+        "convention: above the grid's own error of some millimetres", decides=True,
+    )  # fmt: skip
 
 
 class Elastic(Transcription):

@@ -11,11 +11,23 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.infeasibility.settings import PoseSearch
 from kemba.ocp.task.requirement import Requirement, quantity_expression
+from kemba.settings import Settings, setting
 
 STILL = 1e-6  # weight of squared rates, so that they are determined
 SPREAD = 3.0  # standard deviation of further starts, times the scale of a coordinate
+
+
+class PoseSearch(Settings):
+    """How poses are sought in which requirements hold together."""
+
+    tries: int = setting(
+        4, "1", "starts", "convention: the standing pose and three others", decides=True
+    )
+    met: float = setting(
+        1e-5, "SI", "slack below which a requirement counts as met",
+        "derived: 10 times the certificate's tolerance", decides=True,
+    )  # fmt: skip
 
 
 def silent() -> dict[str, Any]:
