@@ -47,13 +47,15 @@ class Execution:
         return judge(model, plan, plan.time - plan.time[0], self.run)
 
 
-def execute(controller: Trajectory | str | Path, model: Model, **how: Any) -> Execution:
+def execute(
+    controller: Trajectory | str | Path, model: Model, *arguments: Any, **named: Any
+) -> Execution:
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
-    `how`: as `condition_of`. Raises KembaError when the table lacks a column.
+    Further arguments are those of `condition_of`. Raises KembaError when the table lacks a column.
     """
     table = read_controller(controller)
-    condition, begin = condition_of(table, model, **how)
+    condition, begin = condition_of(table, model, *arguments, **named)
     return Execution(later(simulate_one(condition), begin), table)
 
 
