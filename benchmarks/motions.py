@@ -1,22 +1,19 @@
 """How far each motion is planned and certified: python benchmarks/motions.py [FILE.yaml ...]
 
-Without arguments the shipped motions beside the jumps, and the tasks in benchmarks/motions, which
-are not solved whole yet. Everything from a guess (`--cold`). One row each: how far it came, cost,
-CPU seconds of the solves, and the sentence of `solve`.
+Without arguments the shipped motions beside the jumps. Everything from a guess (`--cold`). One row
+each: how far it came, cost, CPU seconds of the solves, and the sentence of `solve`.
 """
 
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 from kemba.config import shipped_configs
 from kemba.errors import KembaError
 from kemba.ocp import load_task
 from kemba.solve import Approach, Listener, best_plan
 
-HERE = Path(__file__).with_name("motions")
-SHIPPED = ("bound", "popup", "max_jump_land")
+JUMPS = ("jump", "jump_forward", "hop", "drop", "stand", "max_jump")
 
 
 def row(file: str) -> str:
@@ -48,8 +45,8 @@ def row(file: str) -> str:
 
 def main() -> None:
     """Print the table."""
-    shipped = [str(shipped_configs("tasks")[f"{name}.yaml"]) for name in SHIPPED]
-    files = sys.argv[1:] or [*shipped, *map(str, sorted(HERE.glob("*.yaml")))]
+    shipped = shipped_configs("tasks")
+    files = sys.argv[1:] or [str(path) for name, path in shipped.items() if name[:-5] not in JUMPS]
     print("| motion | reached | torque² [N².m².s] | CPU [s] | sentence |\n|---|---|---|---|---|")
     for file in files:
         print(row(file), flush=True)

@@ -19,7 +19,7 @@ from pathlib import Path
 from block import printed, put_block
 
 from kemba.ocp import load_task
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.report.solving import solve_into
 from kemba.runs import RunFolder
 from kemba.solve import Approach, Listener, best_plan

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from kemba.ocp.certificate.objective import costs, objective
 from kemba.ocp.certificate.status import Status, missed_of, verdict
-from kemba.ocp.continuation.between import Origin
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner

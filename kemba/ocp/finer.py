@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import ceil
 
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.continued import continued
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan

@@ -13,7 +13,7 @@ from kemba.config import Document
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.status import Status
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.continued import continued, from_scratch, with_grip
 from kemba.ocp.finer import found_and_refined
 from kemba.ocp.infeasibility.checks import check_task

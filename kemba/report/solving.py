@@ -24,7 +24,7 @@ from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
 from kemba.files import WriteError, write_json
 from kemba.ocp import Plan, Task
-from kemba.ocp.continuation.between import write_stages
+from kemba.ocp.continuation.origin import write_stages
 from kemba.runs import PLANT_RUN, STAGES, RunFolder
 from kemba.solve import Approach, best_plan
 from kemba.solve.listener import Listener

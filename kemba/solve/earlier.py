@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from kemba.ocp import load_task, task_model
-from kemba.ocp.continuation.between import Origin, read_stages
+from kemba.ocp.continuation.origin import Origin, read_stages
 from kemba.ocp.task.resolve import resolve
 from kemba.runs import STAGES, load_run
 

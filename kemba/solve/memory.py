@@ -18,7 +18,7 @@ from kemba.files import WriteError, atomic_text
 from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.objective import objective
-from kemba.ocp.continuation.between import Origin
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.task.templates import longest_leg, with_height
 from kemba.solve.earlier import origin_of
 from kemba.stopwatch import Tell

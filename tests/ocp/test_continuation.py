@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from kemba.effects.mechanics.load import Payload
-from kemba.effects.mechanics.piston import SealFriction
 from kemba.model import load_model
-from kemba.ocp.continuation.between import completed, model_between, requirements_between
 from kemba.ocp.continuation.continue_plan import with_impacts
+from kemba.ocp.continuation.origin import completed
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.notes import noted_phases, phase_notes
@@ -109,38 +106,6 @@ def test_phases_survive_their_notes() -> None:
     assert noted_phases({}, constraints, 4, 9) is None
     torn = {**notes, "phases": [notes["phases"][1]]}
     assert noted_phases(torn, constraints, 4, 9) is None, "a phase is missing"
-
-
-def test_between_two_models() -> None:
-    old = load_model("planning", supply=0.7e6)
-    new = load_model("planning", [Payload(m=0.4), SealFriction(F_c=8.0)], supply=0.6e6)
-    half = model_between(old, new, 0.5)
-    assert half.supply == pytest.approx(0.65e6)
-    assert half.effect("payload").value("m") == pytest.approx(0.2)
-    assert half.effect("seal_friction").value("F_c") == pytest.approx(4.0)
-    assert model_between(old, new, 1.0) is new
-
-
-def test_tables_are_between_as_well() -> None:
-    old = load_model("planning")
-    chamber = old.effect("chamber")
-    pushes = tuple(0.8 * force for force in chamber.value("F_extend"))
-    new = old.with_effects([chamber.bind({"F_extend": pushes})])
-    half = model_between(old, new, 0.5).effect("chamber")
-    assert half.value("F_extend") == pytest.approx(0.9 * np.array(chamber.value("F_extend")))
-    assert half.value("F_retract") == chamber.value("F_retract")
-
-
-def test_between_two_tasks(hop: Path) -> None:
-    origin = origin_of(hop)
-    apex = next(r for r in origin.requirements if r.location == ("goals", "apex"))
-    higher = requirements_between(
-        [apex], [type(apex)(apex.location, apex.quantity, apex.at, 0.45, 0.45)], 0.25
-    )[0]
-    assert higher.lower == pytest.approx(0.75 * apex.lower + 0.25 * 0.45)
-    flight = replace(apex, at=None, during=(0.4, 0.6))
-    longer = requirements_between([flight], [replace(flight, during=(0.36, 0.68))], 0.5)[0]
-    assert longer.during == pytest.approx((0.38, 0.64))
 
 
 def test_columns_of_new_effects_are_filled(hop: Path) -> None:

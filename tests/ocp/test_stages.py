@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from kemba.ocp.certificate.objective import objective
-from kemba.ocp.continuation.between import Origin, read_stages, write_stages
 from kemba.ocp.continuation.continue_plan import Continuation
+from kemba.ocp.continuation.origin import Origin, read_stages, write_stages
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhasePart, PhaseProgram

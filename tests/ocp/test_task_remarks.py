@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from kemba.config import Document
+from kemba.config import Document, shipped_configs
 from kemba.ocp import load_task
 from kemba.ocp.task.task import parse_task
 
 
-@pytest.mark.parametrize("name", ["jump", "jump_forward", "hop", "drop", "stand", "max_jump"])
+@pytest.mark.parametrize("name", sorted(shipped_configs("tasks")))
 def test_shipped_tasks_use_all_their_figures(name: str) -> None:
-    assert load_task(f"{name}.yaml")[0].remarks == []
+    assert load_task(name)[0].remarks == []
 
 
 def test_a_height_that_no_goal_asks_for_is_told() -> None:

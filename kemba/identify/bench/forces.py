@@ -150,6 +150,9 @@ def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
     return np.stack([p * h for p in places for h in histories], axis=1)
 
 
+PEAK = 99.5  # percentile of the rows that is taken as the largest [%]
+
+
 def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, ...], Array]:
     """Formulas, and their columns (n, k) of the residual, not whitened, per unit of coefficient."""
     parts: dict[str, list[Array]] = {}
@@ -161,6 +164,13 @@ def formula_columns(predicted: PredictedLogs, theta: Theta) -> tuple[tuple[str, 
                 column = force if channel == "piston/F" else np.zeros(len(force))
                 parts.setdefault(formula, []).append((column / np.sqrt(variance))[keep])
     return tuple(parts), np.stack([np.concatenate(p) for p in parts.values()], axis=1)
+
+
+def formula_weight(predicted: PredictedLogs, theta: Theta, formula: str) -> float:
+    """Largest force of a formula per unit of its coefficient, as a share of a usual friction."""
+    forces = (_forces(predicted, theta, i)[formula] for i in range(len(predicted.logs)))
+    peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
+    return peak / BenchLogSettings.friction
 
 
 def leftover(

@@ -18,6 +18,7 @@ from kemba.identify.bench.forces import (
     bench_missing,
     bench_operating_point,
     formula_columns,
+    formula_weight,
     leftover,
     switchings,
 )
@@ -173,6 +174,11 @@ class BenchProblem(ColouredProblem):
             return {}
         names, columns = formula_columns(self.predicted, theta)
         return dict(zip(names, self.whiten(columns).T, strict=True))
+
+    def weight(self, theta: Theta, formula: str) -> float:
+        """Largest force of a formula per unit of its coefficient, as a share of a usual
+        friction."""
+        return formula_weight(self.predicted, theta, formula)
 
     def leftover(self, theta: Theta) -> Leftover:
         """Force residual, and what a force could depend on."""

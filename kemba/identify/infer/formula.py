@@ -34,6 +34,7 @@ def drift_columns(problem: Problem) -> tuple[Array, Array]:
 
 WIDTH = 10.0  # prior of a term's force, in sigmas of the noise where it acts most
 TERMS = 2  # most terms of a formula: a formula can be read
+MATTERS = 0.2  # smallest force of a term, as a share of what matters in practice
 NO_FORCE = 1e-9  # force, in sigmas, of a term that acts nowhere: zero
 
 
@@ -115,7 +116,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not formulas:
         return None
     ranker, jacobian, names = extended(search, formulas)
-    chosen = _grow(ranker, names)
+    chosen = _matters(search, _formula(ranker, names, _grow(ranker, names)))
     alone = _formula(ranker, names, chosen)
     catalogue = search.points[best].log_evidence - null.log_evidence
     if not chosen or alone.gain <= catalogue + by_chance(len(names)):
@@ -125,6 +126,13 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if alone.gain <= catalogue + test.threshold:
         return None
     return replace(alone, gain=alone.gain - catalogue, p_value=test.p_value(alone.gain))
+
+
+def _matters(search: Search, formula: Formula) -> Hypothesis:
+    """Those terms of a formula that are more than the imperfection that every model has."""
+    problem, theta = search.problem, search.points[NULL].fit.theta
+    parts = zip(formula.candidates, formula.terms, formula.coefficients, strict=True)
+    return tuple(n for n, term, (c, _) in parts if abs(c) * problem.weight(theta, term) > MATTERS)
 
 
 def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:

@@ -8,7 +8,7 @@ from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, VerdictSettings
 from kemba.identify.infer.cross_validation import HeldOut, error
 from kemba.identify.infer.formula import Formula
-from kemba.identify.infer.residual import Drift, pattern_left, unfinished
+from kemba.identify.infer.residual import Drift, explains_structure, pattern_left, unfinished
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
@@ -46,7 +46,8 @@ def caveats_of(
         least = settings.part_of_structure
     elif pattern := pattern_left(search, best):
         reasons.append(f"the error that is left has a pattern: {pattern}")
-        least = settings.part_of_structure
+        if not explains_structure(search, best):
+            least = settings.part_of_structure
     if drift is None and after <= settings.whole:
         least = settings.part  # a whole answer may leave as much
     if ended and after > settings.whole:

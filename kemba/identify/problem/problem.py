@@ -280,6 +280,11 @@ class Problem(ABC):
         coefficient."""
         return {}
 
+    def weight(self, theta: Theta, formula: str) -> float:
+        """Largest force of a formula per unit of its coefficient, as a share of what matters in
+        practice. Default: infinite, so that every formula counts."""
+        return math.inf
+
     def leftover(self, theta: Theta) -> Leftover | None:
         """What the model at theta leaves over, with what it may depend on; None: not known."""
         return None

@@ -1,4 +1,4 @@
-"""The earlier plan solved again for changed figures: at once, else near it first."""
+"""The earlier plan solved again for changed figures, on its own phases."""
 
 from __future__ import annotations
 
@@ -13,12 +13,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.objective import objective
-from kemba.ocp.continuation.between import (
-    Origin,
-    completed,
-    model_between,
-    requirements_between,
-)
+from kemba.ocp.continuation.origin import Origin, completed
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
@@ -29,7 +24,6 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
@@ -45,23 +39,12 @@ from kemba.trajectory import Array, Trajectory
 TRIED = "tuned: jump and jump_forward with other heights, supplies, payloads and distances"
 
 
-EASE = 1e3  # how much rather impulses of the start change than its velocities, scaled
-
-
 class Continuing(Settings):
     """How an earlier plan is solved again for changed figures."""
 
-    near: float = setting(
-        1.0, "1", "proximal weight of the solve that stays near the earlier plan; at 0 half of the "
-        "trials did not converge", TRIED, decides=True,
-    )  # fmt: skip
     iterations: int = setting(
         60, "1", "iterations of each solve; those that converged took 16 to 46", TRIED, decides=True
     )
-    close: float = setting(
-        0.1, "1", "proximal weight where the best plan is sought and 0 does not converge", TRIED,
-        decides=True,
-    )  # fmt: skip
     patience: int = setting(
         10, "1", "first iterations without a smaller violation, after which a solve is given up; "
         "those that converged had none for 9 at most", TRIED, decides=True,
@@ -70,20 +53,16 @@ class Continuing(Settings):
         0.5, "1", "scaled violation below which a solve is no longer given up for that", TRIED,
         decides=True,
     )  # fmt: skip
+    ease: float = setting(
+        1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
+        "convention: a trajectory says nothing of impulses",
+    )  # fmt: skip
     push: float = setting(
         1e-3, "1", "distance from the bounds of such a start", TRIED, decides=True
-    )  # fmt: skip
-    solves: int = setting(
-        8, "1", "solves at most on the way to the changed figures",
-        "convention: a plan from scratch costs about as much", decides=True,
     )  # fmt: skip
     dear: float = setting(
         3.0, "1", "times the earlier plan's cost beyond which another minimum is likely",
         "convention: more than such a change usually asks for",
-    )  # fmt: skip
-    shortest: float = setting(
-        0.1, "1", "of the way: a shorter step is not tried", "convention: ten steps at most",
-        decides=True,
     )  # fmt: skip
 
     def most(self, before: float) -> float:
@@ -111,7 +90,6 @@ class Continuation:
     tell: Callable[[str], None] = lambda text: None
     steps: list[Attempt] = field(default_factory=list)
     size: tuple[int, int] = (0, 0)  # variables and rows of the last program
-    solution: Stages | None = None  # to begin with: the last one that was solved on these nodes
 
     def run(self) -> Refined:
         """The plan on the phases of the earlier one; where these do not fit, on phases read
@@ -119,21 +97,12 @@ class Continuation:
         try:
             start = completed(self.origin.plan, self.model)
             reduction = reduction_of(self.model, self.task, self.requirements, start)
-            found: Refined | None = None
-            meshes = []
             for mesh in self._meshes(start, reduction):
-                meshes.append(mesh)
-                found = self._at_once(mesh, reduction)
-                if found is not None:
+                found = self._solved(mesh, reduction)
+                if found.ending.cut_short or self._is_kept(found):
                     return found
-                if self.origin.ticks:
-                    return Refined(None, None, Ending.GAVE_UP, 0)
-            for mesh in meshes:
-                found = self._walk(mesh, reduction)
-                if found.done:
-                    return found
-            if found is not None and self.origin.once:
-                return found
+            if self.origin.once:
+                return Refined(None, None, Ending.GAVE_UP, 0)
             return self._read_anew(start)
         except KembaError as error:
             why = f"the earlier plan does not fit this model: {error}"
@@ -162,115 +131,43 @@ class Continuation:
         if shared is not None:
             yield Mesh(*shared, None)
 
-    def _at_once(self, mesh: Mesh, reduction: Reduction) -> Refined | None:
-        """The best plan in one solve; None where it does not converge or misses the tolerances, or
-        costs so much more than the earlier plan that another minimum is likely."""
-        self.tell(f"from {self.origin.name}: the best one")
-        self.solution = mesh.stages
-        found = self._solved(1.0, mesh.start, mesh.phases, reduction, 0.0)
-        if found.ending.cut_short:
-            return found
-        o = self.origin
+    def _is_kept(self, found: Refined) -> bool:
+        """Whether a plan keeps to the tolerances, and costs not so much more than the earlier one
+        that another minimum is likely."""
+        new, measured, o = found.trajectory, found.certificate, self.origin
+        if new is None or measured is None or not measured.within(self.task.tolerances):
+            return False
         before = objective(o.model, self.task, o.requirements, o.plan)
-        measured = found.certificate
-        kept = measured is not None and measured.within(self.task.tolerances)
-        if kept and self._cost(found) <= Continuing.current().most(before):
-            return found
-        return None
+        cost = objective(self.model, self.task, self.requirements, new)
+        return cost <= Continuing.current().most(before)
 
-    def _walk(self, mesh: Mesh, reduction: Reduction) -> Refined:
-        """In one step if it converges; else from the earlier plan solved on these intervals, in one
-        step again, then in halves. At last the best plan for what is asked."""
-        settings, (start, phases, self.solution) = Continuing.current(), mesh
-        done, step, settled = 0.0, 1.0, False
-        found = Refined(None, None, Ending.GAVE_UP, 0)
-        whole = 3  # solves: the change, none of it, the change again
-        for _ in range(whole if self.origin.once else settings.solves):
-            share = min(1.0, done + step)
-            self.tell(f"from {self.origin.name}: {share:.0%} of the change")
-            found = self._solved(share, start, phases, reduction, settings.near)
-            if found.trajectory is not None:
-                start, done, settled = found.trajectory, share, True
-                if done >= 1.0:
-                    return self._best(found, phases, reduction)
-                step = step or 1.0
-            elif found.done or step / 2 < settings.shortest:
-                break
-            else:
-                step = step / 2 if settled else 0.0
-                settled = True
-        return replace(found, trajectory=None, certificate=None)
-
-    def _best(self, near: Refined, phases: list[Phase], reduction: Reduction) -> Refined:
-        """The cheapest plan from the near one, which is kept where that does not converge, or
-        where it ends in a plan that costs more."""
-        assert near.trajectory is not None
+    def _solved(self, mesh: Mesh, reduction: Reduction) -> Refined:
+        """The best plan in one solve: from the stages, and with the multipliers where they are
+        known for these elements, else from the nodes of the trajectory."""
         self.tell(f"from {self.origin.name}: the best one")
-        for weight in (0.0, Continuing.current().close):
-            best = self._solved(1.0, near.trajectory, phases, reduction, weight)
-            if best.ending.cut_short or (best.done and self._cost(best) <= self._cost(near)):
-                return best
-        return near
-
-    def _cost(self, found: Refined) -> float:
-        assert found.trajectory is not None
-        return objective(self.model, self.task, self.requirements, found.trajectory)
-
-    def _solved(
-        self,
-        share: float,
-        start: Trajectory,
-        phases: list[Phase],
-        reduction: Reduction,
-        weight: float,
-    ) -> Refined:
-        """The plan at `share` of the change from a trajectory, with a proximal `weight`."""
-        program, begin, known = self._program(share, start, phases, reduction, weight)
-        settings, slow = Continuing.current(), Refining.current().slow
+        refiner = Refiner(
+            self.model, self.task, self.requirements, mesh.start, reduction, self.control
+        )
+        program, x = refiner.build(mesh.phases, mesh.start, RADAU5)
+        kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
+        x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
+        begin = Iterate(x)
+        if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
+            begin = mesh.stages.iterate(program, x)
+        settings, refining = Continuing.current(), Refining.current()
         options = warm(min(settings.iterations, self.task.solver.max_iterations))
-        mu = ipopt.last_barrier(Refining.current().tol)
+        mu = ipopt.last_barrier(refining.tol)
         if begin.lam_g is not None:
             # a multiplier is at least that of a bound at distance 1
             options |= ipopt.warm(mu, settings.push, warm_start_mult_bound_push=mu)
-        elif known and not weight:
-            options |= ipopt.central(mu, Refining.current().push)
-        stagnation = Stagnation(settings.patience, settings.underway, slow)
+        elif kept is not None:
+            options |= ipopt.central(mu, refining.push)
+        stagnation = Stagnation(settings.patience, settings.underway, refining.slow)
         found = solve(program, begin, options, self.control, stagnation)
         assert found.ending is not None
-        name = f"near the earlier plan, {share:.0%}" if weight else "from the earlier plan"
-        self.steps.append(Attempt(name, found.ending, found.iterations))
+        self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)
-        ended = _ended(program, found)
-        self.solution = ended.stages or self.solution
-        return ended
-
-    def _program(
-        self,
-        share: float,
-        start: Trajectory,
-        phases: list[Phase],
-        reduction: Reduction,
-        weight: float,
-    ) -> tuple[PhaseProgram, Iterate, bool]:
-        """The program at `share` of the change, and where it begins: at the stages, and with the
-        multipliers where they are known for these elements, else at the nodes of a trajectory.
-        True where it begins at stages."""
-        model = model_between(self.origin.model, self.model, share)
-        asked = requirements_between(self.origin.requirements, self.requirements, share)
-        task = self.task.model_copy(update={"grip": 1.0 - share * (1.0 - self.task.grip)})
-        refiner = Refiner(model, task, asked, start, reduction, self.control)
-        program, x = refiner.build(phases, start, RADAU5)
-        stages = self.solution
-        kept = on_elements(program, stages) if stages is not None else None
-        x = with_impacts(program, x, EASE) if kept is None else kept
-        if self.origin.ticks:
-            on_ticks(program, x)
-        known = kept is not None
-        if weight:
-            return program, Iterate(program.proximal(x, weight)), known
-        if stages is None or stages.phases != tuple(phases):
-            return program, Iterate(x), known
-        return program, stages.iterate(program, x), known
+        return _ended(program, found)
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")

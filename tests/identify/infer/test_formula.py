@@ -43,6 +43,22 @@ def test_slow_noise_is_taken_for_a_formula_less_often(monkeypatch: pytest.Monkey
     assert alarms >= 6 and found <= alarms // 2
 
 
+def test_a_term_of_less_force_than_every_model_leaves_is_no_formula(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A fifth of a usual friction is what every model leaves; the same term counts where it is
+    more."""
+    careless = NullTest(np.zeros(10), (), 200)
+    monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
+    search = next(s for s in map(searched, range(40)) if look(s, NULL) is not None)
+    found = look(search, NULL)
+    assert found is not None
+    largest = max(abs(c) for c, _ in found.coefficients)
+    for share, kept in ((0.19, False), (0.21, True)):
+        monkeypatch.setattr(search.problem, "weight", lambda *_, w=share / largest: w)
+        assert (look(search, NULL) is not None) == kept
+
+
 def searched(seed: int) -> Search:
     """The search on logs of the toy in which nothing is missing."""
     toy, rng, keep = Toy({}, seed), np.random.default_rng(seed), 0.9

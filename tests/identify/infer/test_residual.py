@@ -44,15 +44,23 @@ def test_gains_count_by_the_scatter_that_is_left(monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.mark.parametrize(
-    ("error", "said"),
-    [((2.42, 1.66), "unknown"), ((2.6, 1.52), "partly"), ((1.7, 1.46), "partly")],
+    ("repeats", "error", "said"),
+    [
+        (3.0, (2.42, 1.66), "unknown"),
+        (0.02, (2.42, 1.66), "partly"),
+        (3.0, (2.6, 1.52), "partly"),
+        (3.0, (1.7, 1.46), "partly"),
+    ],
 )
-def test_half_is_asked_where_more_is_left_than_a_whole_answer_may_leave(
-    monkeypatch: pytest.MonkeyPatch, error: tuple[float, float], said: str
+def test_half_is_asked_where_much_is_left_that_repeats_itself(
+    monkeypatch: pytest.MonkeyPatch, repeats: float, error: tuple[float, float], said: str
 ) -> None:
-    """The effect explains 40 %, 52 % or 23 % of the excess, and a pattern is left."""
+    """The effect explains 40 %, 52 % or 23 % of the excess, and a pattern is left: of 5.9 that
+    repeats itself half, or hardly anything."""
     best = ("both_mode_loss",)
     errors = dict(zip(((), best), error, strict=True))
+    structure = {(): (7.0, 5.9), best: (1.0, repeats)}
+    monkeypatch.setattr(rest, "_structured", lambda search, hypothesis: structure[hypothesis])
     monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
     monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "a force after extend")
     monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
