@@ -15,15 +15,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from kemba.effects.catalogue import (
-    HoseLag,
-    OrificeChamber,
-    PistonDamping,
-    SealFriction,
-    SupplyLine,
-    Valve,
-)
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.mechanics.piston import PistonDamping, SealFriction
+from kemba.effects.pneumatics.flow import ATMOSPHERE
+from kemba.effects.pneumatics.hose import HoseLag
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply import SupplyLine
+from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model
 

@@ -18,8 +18,6 @@ from kemba.files import read_json, sha256, write_error, write_json
 from kemba.folders import LOCK, lock_folder, try_writing, unlock
 from kemba.trajectory import Trajectory
 
-__all__ = ["Run", "RunFolder", "load_run", "write_json"]
-
 MANIFEST = "manifest.json"
 PLANT_RUN = "plant.csv"  # the motion of the simulated robot, in the plan's clock
 STAGES = "stages.npz"  # the solved program, from which `solve --from` begins

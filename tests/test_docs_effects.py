@@ -11,15 +11,12 @@ import pytest
 
 from kemba.config import parse
 from kemba.config.document import load_text
-from kemba.effects.catalogue import (
-    HoseLag,
-    OrificeChamber,
-    PistonDamping,
-    SealFriction,
-    SupplyLine,
-    Valve,
-)
 from kemba.effects.describe import page
+from kemba.effects.mechanics.piston import PistonDamping, SealFriction
+from kemba.effects.pneumatics.hose import HoseLag
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply import SupplyLine
+from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
 from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model, load_model

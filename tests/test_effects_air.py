@@ -6,16 +6,9 @@ import numpy as np
 import pytest
 
 from kemba.effects import Effect
-from kemba.effects.catalogue import (
-    BothModeLoss,
-    CrossLeak,
-    HoseLag,
-    RiseTimeScale,
-    SupplyDroop,
-    SupplyScale,
-    ValveCloseDelay,
-    ValveDelay,
-)
+from kemba.effects.pneumatics.hose import BothModeLoss, CrossLeak, HoseLag
+from kemba.effects.pneumatics.supply import RiseTimeScale, SupplyDroop, SupplyScale
+from kemba.effects.pneumatics.valve import ValveCloseDelay, ValveDelay
 from kemba.errors import KembaError
 from kemba.mechanism import load_cylinder
 from kemba.model import Model, build_model, load_model, load_spec

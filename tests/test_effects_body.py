@@ -9,19 +9,10 @@ import numpy as np
 import pytest
 
 from kemba.effects import Effect
-from kemba.effects.catalogue import (
-    Boom,
-    BoomLever,
-    BoomSpring,
-    ComOffset,
-    Contact,
-    GroundCompliance,
-    HipSpring,
-    MassSplit,
-    MotorLag,
-    RotorInertia,
-    TorqueScale,
-)
+from kemba.effects.mechanics.boom import Boom, BoomLever, BoomSpring
+from kemba.effects.mechanics.ground import Contact, GroundCompliance
+from kemba.effects.mechanics.hip import HipSpring, MotorLag, RotorInertia, TorqueScale
+from kemba.effects.mechanics.load import ComOffset, MassSplit
 from kemba.effects.sensors import as_measured
 from kemba.effects.series import Series
 from kemba.errors import KembaError

@@ -7,9 +7,21 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kemba.effects.catalogue import CrossLeak, OrificeChamber, SupplyLine, Valve
-from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
-from kemba.effects.pneumatics.flow import CHOKED, SUBSONIC, mass_flow, phi, psi
+from kemba.effects.pneumatics.flow import (
+    ATMOSPHERE,
+    CHOKED,
+    GAS,
+    KAPPA,
+    SUBSONIC,
+    TEMPERATURE,
+    mass_flow,
+    phi,
+    psi,
+)
+from kemba.effects.pneumatics.hose import CrossLeak
+from kemba.effects.pneumatics.orifice import OrificeChamber
+from kemba.effects.pneumatics.supply import SupplyLine
+from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model

@@ -93,7 +93,7 @@ def test_every_verb_takes_it(own: Path) -> None:
 def test_a_file_that_changes_is_read_again(own: Path) -> None:
     (first,) = BY_KIND.load_file(own)
     assert BY_KIND.load_file(own) == (first,)
-    own.write_text(own.read_text().replace('"seal_hysteresis"', '"seal_lip"'))
+    own.write_text(own.read_text().replace("SealHysteresis", "SealLip"))
     (second,) = BY_KIND.load_file(own)
     assert second is not first
     assert "seal_lip" in BY_KIND and "seal_hysteresis" not in BY_KIND

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from kemba.effects import BY_KIND, Effect
-from kemba.effects.catalogue import SENSORS, OrificeChamber, PistonDamping
+from kemba.effects.catalogue import SENSORS
+from kemba.effects.mechanics.piston import PistonDamping
+from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.model import Model, load_model
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.simulate import simulate

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.files import atomic_text, sha256
-from kemba.runs import RunFolder, load_run, write_json
+from kemba.files import atomic_text, sha256, write_json
+from kemba.runs import RunFolder, load_run
 from kemba.trajectory import Trajectory
 
 

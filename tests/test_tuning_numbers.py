@@ -24,18 +24,17 @@ DRAWN = (
 # Numbers at a module's top level that are explained here and not by a comment beside them.
 CONSTANTS = {  # file -> names, why
     # physics
-    "effects/pneumatics/constants.py": ("ATMOSPHERE KAPPA GAS TEMPERATURE", "constants of air"),
     "effects/pneumatics/flow.py": (
-        "CHOKED SUBSONIC SOFT",
-        "the critical pressure ratio; smoothing",
+        "ATMOSPHERE KAPPA GAS TEMPERATURE CHOKED SUBSONIC SOFT",
+        "constants of air; the critical pressure ratio; smoothing",
     ),
     "effects/pneumatics/chamber.py": ("OF_A_KIND ENTRY", "tolerances of an effect's figures"),
     "effects/pneumatics/damping.py": ("NONE", "tolerances of an effect's figures"),
     "effects/pneumatics/switching.py": ("ON", "what a valve takes for a command"),
-    "effects/pneumatics/timing.py": ("EARLIEST", "nothing switches before its command"),
-    "effects/mechanics/boom_faults.py": ("V_BOOM W_PITCH", "smoothing widths of formulas"),
+    "effects/pneumatics/valve.py": ("EARLIEST", "nothing switches before its command"),
+    "effects/mechanics/boom.py": ("V_BOOM W_PITCH", "smoothing widths of formulas"),
     "effects/pneumatics/gas.py": ("ROUND", "rounds a root, as SOFT does"),
-    "effects/mechanics/friction.py": ("V_COULOMB", "smoothing width of a formula"),
+    "effects/mechanics/piston.py": ("V_COULOMB", "smoothing width of a formula"),
     "effects/mechanics/ground.py": ("SMOOTH", "smoothing width of a formula"),
     "effects/mechanics/hip.py": ("W_COULOMB", "smoothing width of a formula"),
     "effects/base.py": ("REMEASURED", "tolerance of what a discovery has measured"),

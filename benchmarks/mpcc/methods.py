@@ -8,7 +8,6 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.settings import Newton
 from kemba.ocp.mpcc.solve import solve_mpcc
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate, warm
 from kemba.ocp.relaxation.schedule import exact, interior
@@ -39,7 +38,7 @@ def on_branch(program: Mpcc, start: np.ndarray) -> Iterate:
     refining does to a plan, whose modes are fixed."""
     found = schedule(program, start)
     branch = program.branch(program.nearest(found.Y))
-    options = warm(Starts.current().tighten_mu, Newton.current().warm_push, max_iter=MOST)
+    options = warm(Starts.current().tighten_mu, max_iter=MOST)
     last = Ipopt(branch, options).solve(Iterate(found.Y), [0.0])
     better = last if last.solved else found
     return replace(better, iterations=found.iterations + last.iterations)

@@ -83,12 +83,12 @@ def _is_measured(file: Path) -> bool:
 
 
 def _yaml(file: Path) -> dict[str, Any]:
-    from kemba.config import load_yaml, locate, parse
+    from kemba.config import find_config, load_yaml, parse
     from kemba.errors import ConfigErrors, KembaError, listed_errors
     from kemba.ocp.reading import read_task
     from kemba_cli.schemas import SCHEMAS, called, kind_of, schema_of, strays
 
-    document = load_yaml(locate(file, SCHEMAS))
+    document = load_yaml(find_config(file, *SCHEMAS))
     kind = kind_of(document)
     try:
         parsed = read_task(document) if kind == "tasks" else parse(document, schema_of(kind))

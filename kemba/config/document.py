@@ -10,7 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, WithJsonSchema
 
-from kemba.config.reader import LARGEST, PATTERNS, Location, Mark, YamlError, read
+from kemba.config.reader import LARGEST, PATTERNS, Mark, YamlError, read
+from kemba.config.reader import Location as Location
 from kemba.errors import ConfigErrors, KembaError
 from kemba.files import atomic_text
 
@@ -76,8 +77,6 @@ def _text(dumper: Any, value: str) -> Any:
     return dumper.represent_scalar("tag:yaml.org,2002:str", value, style=style)
 
 
-__all__ = ["Document", "Location", "dump_text", "dump_yaml", "load_text", "load_yaml", "written"]
-
 WIDE = 160  # characters of a line that are shown
 TIGHT = re.compile(r"\s*[\w*/.-]+:[^\s/]")  # `height:0.5 m`, which YAML reads as one word
 
@@ -137,18 +136,17 @@ def load_yaml(path: str | Path) -> Document:
     Raises KembaError when the file cannot be read, is not YAML or is larger than 2 MB, and
     ConfigErrors listing all keys that occur twice.
     """
-    largest = LARGEST
     try:
         with Path(path).open("rb") as stream:
-            content = stream.read(largest + 1)
+            content = stream.read(LARGEST + 1)
         text = content.decode("utf-8-sig")
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except UnicodeDecodeError:
-        if len(content) <= largest:
+        if len(content) <= LARGEST:
             raise KembaError(str(path), "is not a UTF-8 text", "a YAML file was expected") from None
-    if len(content) > largest:
-        raise KembaError(str(path), f"is larger than {largest} bytes", "a YAML file was expected")
+    if len(content) > LARGEST:
+        raise KembaError(str(path), f"is larger than {LARGEST} bytes", "a YAML file was expected")
     return load_text(text, str(path))
 
 

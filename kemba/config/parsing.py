@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, get_args
 
-from kemba.config.document import Document, Location, dump_yaml, load_text, load_yaml, written
+from kemba.config.document import Document, Location, load_text, written
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.quantity import Param, expectation
 
@@ -18,21 +18,6 @@ if TYPE_CHECKING:
     from pydantic import BaseModel, ValidationError
 
     Schema = TypeVar("Schema", bound=BaseModel)
-
-
-__all__ = [
-    "Document",
-    "apply_overrides",
-    "beside",
-    "dump_yaml",
-    "find_config",
-    "is_file",
-    "load_yaml",
-    "locate",
-    "parse",
-    "shipped_configs",
-    "shipped_folder",
-]
 
 
 RANGE = {"equals", "at_least", "at_most"}
@@ -78,14 +63,6 @@ def apply_overrides(document: Document, options: Iterable[str]) -> Document:
     return dataclasses.replace(document, data=data, overrides=overrides)
 
 
-def find_config(name: str | Path, folder: str) -> Path:
-    """The file `name` as given, or the one shipped in configs/`folder` (`.yaml` may be omitted).
-
-    Raises KembaError with the nearest shipped names.
-    """
-    return locate(name, (folder,))
-
-
 def beside(name: str, folder: Path) -> str:
     """The whole path of the file `name` in `folder` or else in the current folder; where there is
     neither, `name` as given, which may be that of a shipped file."""
@@ -94,8 +71,9 @@ def beside(name: str, folder: Path) -> str:
     return name if found is None else str(found.resolve())
 
 
-def locate(name: str | Path, folders: Collection[str]) -> Path:
-    """The path of a YAML file: of the user's own, or one shipped in `folders` of configs/.
+def find_config(name: str | Path, *folders: str) -> Path:
+    """The path of a YAML file: of the user's own, or one shipped in `folders` of configs/ (whose
+    `.yaml` may be omitted).
 
     Raises KembaError where there is no such file, with the nearest shipped name, or where the name
     does not end in .yaml.

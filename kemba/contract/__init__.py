@@ -1,5 +1,6 @@
 """What every effect promises, as checks that anyone can run on an effect of their own."""
 
-from kemba.contract.check import CHECKS, Broken, Check, CheckResult, examine
+from kemba.contract.cases import Broken
+from kemba.contract.check import CHECKS, Check, CheckResult, examine
 
 __all__ = ["CHECKS", "Broken", "Check", "CheckResult", "examine"]

@@ -20,8 +20,6 @@ from kemba.errors import KembaError
 from kemba.model.spec import ModelSpec
 from kemba.quantity import is_si
 
-__all__ = ["CHECKS", "Broken", "Check", "CheckResult", "examine"]
-
 
 def _always(effect: type[Effect]) -> bool:
     return True

@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from kemba.effects.base import At, Contribution, Effect, Pair, PortAt, Signal
+from kemba.effects.base import At, Contribution, Deviation, Effect, Pair, PortAt, Signal
 from kemba.effects.catalogue import BY_KIND, EFFECTS, load_effects
 from kemba.effects.registry import Registered
 
@@ -15,6 +15,7 @@ __all__ = [
     "AnyEffect",
     "At",
     "Contribution",
+    "Deviation",
     "Effect",
     "Pair",
     "PortAt",

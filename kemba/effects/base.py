@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
@@ -117,7 +118,8 @@ class Effect(BaseModel):
     """One piece of physics that a model can list.
 
     Subclasses declare parameters as annotated fields, variables by symbol (as the equation
-    writes them) and `evaluate`. They know no solver, step size, file or plot.
+    writes them) and `evaluate`. They know no solver, step size, file or plot. The `kind` in YAML is
+    the name of the class in small letters, `hip_friction` for HipFriction, unless it is declared.
     `off` names the one parameter that switches an effect and the value at which it is absent;
     its other parameters are shapes, which matter only when it is on and default to a typical
     value. A parameter that may not change sign has a lower bound; the `size` of a scale is that
@@ -126,7 +128,7 @@ class Effect(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    kind: str
+    kind: str = ""
     on: str | None = None
     # how an effect that was found is known; it is no physics, so dumps and hashes leave it out
     support: Literal["sure", "likely"] | None = Field(default=None, exclude=True)
@@ -148,6 +150,13 @@ class Effect(BaseModel):
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it
     nominal: ClassVar[Mapping[str, Tolerance]] = {}  # figures that differ from machine to machine
     on_rod: ClassVar[bool] = True  # False: a force sensor at the rod does not measure its effort
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if "kind" not in cls.__annotations__:
+            kind = re.sub(r"(?<!^)(?=[A-Z])", "_", cls.__name__).lower()
+            cls.__annotations__ = {**cls.__annotations__, "kind": Literal[kind]}
+            cls.kind = kind
 
     @field_validator("on")
     @classmethod
@@ -264,3 +273,65 @@ class Effect(BaseModel):
         values = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
         support = {"support": self.support} if self.support else {}
         return {"kind": self.kind, **values, **support}
+
+
+class Deviation(Effect):
+    """Physics that a machine may have beyond the planning model: a candidate of identification.
+
+    Unless `off` says otherwise its first parameter switches it, and is at its default when absent.
+    """
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **options: Any) -> None:
+        if "off" not in cls.__dict__:
+            cls.off = {name: cls.model_fields[name].default for name in [*cls.declared()][:1]}
+
+
+class AirEffect(Deviation):
+    """A deviation of the air between supply and chambers."""
+
+    family = "air"
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+
+
+class PistonEffect(Deviation):
+    """A deviation along the piston."""
+
+    family = "piston"
+    ports: ClassVar[tuple[str, ...]] = ("piston",)
+
+
+class HipEffect(Deviation):
+    """A deviation at the hip joint."""
+
+    family = "hip"
+    ports: ClassVar[tuple[str, ...]] = ("hip",)
+
+
+class GroundEffect(Deviation):
+    """A deviation of the ground under each foot."""
+
+    family = "ground"
+    ports: ClassVar[tuple[str, ...]] = ("foot_x", "foot_z")
+
+
+class BodyEffect(Deviation):
+    """A deviation of the body itself."""
+
+    place = "body"
+    family = "body"
+    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z")
+
+
+class BoomEffect(BodyEffect):
+    """A deviation of the boom, as the body feels it."""
+
+    family = "boom"
+
+
+class AxisEffect(Deviation):
+    """An effect at the axis of a drive: looked for on the user's own rigs only."""
+
+    family = "drive"
+    ports: ClassVar[tuple[str, ...]] = ("axis",)
+    own_rigs = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
@@ -68,15 +68,14 @@ class Expression(Effect):
     max. Every part is checked for its dimension.
     """
 
-    kind: Literal["expression"] = "expression"
     called: str = Field(alias="name", pattern=r"^[A-Za-z]\w*$")
     on: str
     force: str
     constants: dict[str, Number] = Field(default_factory=dict, alias="parameters")
 
-    family: ClassVar[str] = "expression"
-    equation: ClassVar[str] = "force, added to the right-hand side of its port"
-    source: ClassVar[str] = "the user's own"
+    family = "expression"
+    equation = "force, added to the right-hand side of its port"
+    source = "the user's own"
 
     @model_validator(mode="after")
     def _consistent(self) -> Expression:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import field_validator, model_validator
 
-from kemba.effects.base import Effect
+from kemba.effects.base import Deviation, Effect
 from kemba.effects.series import Series
 from kemba.quantity import Param, to_si
 
@@ -41,7 +41,7 @@ CHANNELS: dict[str, tuple[str, float]] = {
 }
 
 
-class SensorEffect(Effect):
+class SensorEffect(Deviation):
     """A fault of one sensor. `channel` is a column without its unit: `body/pitch`.
 
     `off` names the parameter that switches it. `straight`: what is measured is linear in that
@@ -50,9 +50,9 @@ class SensorEffect(Effect):
 
     channel: str
 
-    place: ClassVar[Literal["leg", "body"]] = "body"
-    family: ClassVar[str] = "sensors"
-    moves: ClassVar[bool] = False
+    place = "body"
+    family = "sensors"
+    moves = False
     stage: ClassVar[Literal["clock", "gain", "zero"]]
     straight: ClassVar[bool] = True
     in_channel_unit: ClassVar[tuple[str, ...]] = ()
@@ -123,14 +123,12 @@ class SensorEffect(Effect):
 class SensorBias(SensorEffect):
     """A constant offset: a zero that was set wrongly. Does not enter the motion."""
 
-    kind: Literal["sensor_bias"] = "sensor_bias"
     b: Annotated[float, Param("1", 5.0, doc="offset in the channel's unit; size 5 sigma")] = 0.0
 
-    equation: ClassVar[str] = "measured = true + b"
-    source: ClassVar[str] = "encoder and transducer zeros"
-    off: ClassVar[dict[str, float]] = {"b": 0.0}
-    stage: ClassVar[Literal["clock", "gain", "zero"]] = "zero"
-    in_channel_unit: ClassVar[tuple[str, ...]] = ("b",)
+    equation = "measured = true + b"
+    source = "encoder and transducer zeros"
+    stage = "zero"
+    in_channel_unit = ("b",)
 
     @model_validator(mode="before")
     @classmethod
@@ -154,13 +152,11 @@ class SensorBias(SensorEffect):
 class SensorScale(SensorEffect):
     """A wrong gain: lever arm, encoder counts, transducer sensitivity. Not in the motion."""
 
-    kind: Literal["sensor_scale"] = "sensor_scale"
     k: Annotated[float, Param("1", 0.02, doc="relative error of the gain")] = 0.0
 
-    equation: ClassVar[str] = "measured = (1 + k) true"
-    source: ClassVar[str] = "calibration of encoders and transducers"
-    off: ClassVar[dict[str, float]] = {"k": 0.0}
-    stage: ClassVar[Literal["clock", "gain", "zero"]] = "gain"
+    equation = "measured = (1 + k) true"
+    source = "calibration of encoders and transducers"
+    stage = "gain"
 
     def measured(self, true: Series) -> Series:
         return true.times(1 + self.k)
@@ -172,14 +168,12 @@ class SensorScale(SensorEffect):
 class SensorDelay(SensorEffect):
     """The channel comes later than the others: filters, bus. Does not enter the motion."""
 
-    kind: Literal["sensor_delay"] = "sensor_delay"
     dt: Annotated[float, Param("s", 0.003, doc="delay")] = 0.0
 
-    equation: ClassVar[str] = "measured(t) = true(t - dt)"
-    source: ClassVar[str] = "filters and bus transport"
-    off: ClassVar[dict[str, float]] = {"dt": 0.0}
-    stage: ClassVar[Literal["clock", "gain", "zero"]] = "clock"
-    straight: ClassVar[bool] = False
+    equation = "measured(t) = true(t - dt)"
+    source = "filters and bus transport"
+    stage = "clock"
+    straight = False
 
     @property
     def lateness(self) -> float:

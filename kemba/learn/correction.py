@@ -214,7 +214,6 @@ class Aim:
         One that falls where it `must` land, or has an edge far from where `first` has it, counts as
         fallen.
         """
-        fallen = FALLEN
         try:
             flight, lands = self.expected(table, rest)
         except KembaError:
@@ -226,7 +225,7 @@ class Aim:
             signed[1:] = 0.0
         far = not _within(first, table, AimSettings.current().moved)
         if far or (must and not lands) or not np.isfinite(signed).all():
-            return ExecutedTable(table, None, signed, fallen)
+            return ExecutedTable(table, None, signed, FALLEN)
         turns = abs(signed[2]) > 1.0 + 1e-9
         error = float(np.abs(signed[:2]).max())
         return ExecutedTable(table, None, signed, error + (TURNED if turns else 0.0))

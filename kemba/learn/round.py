@@ -12,7 +12,7 @@ import numpy as np
 
 from kemba.config import Document, beside, dump_yaml
 from kemba.errors import KembaError, enumerated
-from kemba.files import sha256
+from kemba.files import sha256, write_json
 from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery
@@ -37,7 +37,7 @@ from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
 from kemba.plotting.source import Machine, load_machine
 from kemba.report.solving import solve_into
-from kemba.runs import Run, RunFolder, load_run, write_json
+from kemba.runs import Run, RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of
 from kemba.trajectory import Array, Trajectory

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import casadi as ca
 from pydantic import Field, model_validator
@@ -118,33 +118,37 @@ OwnRig = Annotated[CylinderRig | DriveRig | VesselRig, Field(discriminator="kind
 
 def own_mechanism(rig: CylinderRig | DriveRig | VesselRig) -> Mechanism:
     """The rig as a mechanism whose motion is given: `piston/x`, `axis/q`, or nothing moves."""
+    facts: dict[str, Any] = {"name": f"{rig.kind} rig", "rig": rig.kind, "gravity": GRAVITY}
     if isinstance(rig, CylinderRig):
         x = Quantity("piston/x", "m", -math.inf, math.inf, 0.02, doc="piston extension")
         rate = Quantity("piston/v", "m.s-1", -5.0, 5.0, 0.1, doc="piston rate")
         pressures = {f"chamber/{side}/P": "Pa" for side in rig.chambers}
         logged = {"piston/x": "m", "piston/F": "N", **pressures}
-        return _one_axis(rig.kind, logged, x, rate, rig.sign_speed, rig)
+        return _one_axis(x, rate, logged=logged, sign_speed=rig.sign_speed, bore=rig, **facts)
     if isinstance(rig, DriveRig):
         unit, force = ("m", "N") if rig.motion == "linear" else ("rad", "N.m")
         q = Quantity("axis/q", unit, -math.inf, math.inf, 0.1, doc="position of the axis")
         rate = Quantity("axis/v", f"{unit}.s-1", -math.inf, math.inf, 0.1, doc="its rate")
-        return _one_axis(rig.kind, {"axis/q": unit, "axis/tau": force}, q, rate, rig.speed)
+        logged = {"axis/q": unit, "axis/tau": force}
+        return _one_axis(q, rate, logged=logged, sign_speed=rig.speed, **facts)
     still = Quantity("vessel/x", "m", 0.0, 0.0, 1.0, doc="nothing moves here")
     rate = Quantity("vessel/v", "m.s-1", 0.0, 0.0, 1.0, doc="nothing moves here")
-    return _one_axis(rig.kind, {"vessel/P": "Pa", "vessel/T": "K"}, still, rate, 1.0)
+    logged = {"vessel/P": "Pa", "vessel/T": "K"}
+    return _one_axis(still, rate, logged=logged, sign_speed=1.0, **facts)
 
 
-def _one_axis(
-    kind: str,
-    logged: dict[str, str],
-    place: Quantity,
-    rate: Quantity,
-    sign_speed: float,
-    bore: Bore | None = None,
-) -> Mechanism:
+def rig_mechanism(cylinder: Cylinder) -> Mechanism:
+    """A piston on the bench: one coordinate, its extension `piston/x` [m], massless."""
+    x = Quantity("piston/x", "m", 0.0, cylinder.stroke, 0.02, doc="piston extension, 0 retracted")
+    rate = Quantity("piston/v", "m.s-1", -5.0, 5.0, 0.5, doc="piston rate")
+    # nothing hangs on the rod
+    return _one_axis(x, rate, name="rig", gravity=0.0, cylinder=cylinder)
+
+
+def _one_axis(place: Quantity, rate: Quantity, **facts: Any) -> Mechanism:
+    """A mechanism of one coordinate whose motion is imposed; `facts`: what else it is."""
     q, v, a = ca.SX.sym("q"), ca.SX.sym("v"), ca.SX.sym("a")
     return Mechanism(
-        name=f"{kind} rig",
         q=q,
         v=v,
         a=a,
@@ -153,31 +157,6 @@ def _one_axis(
         inverse_dynamics=ca.SX.zeros(1),
         ports={place.name: Port(place, rate, q)},
         legs=("",),
-        gravity=GRAVITY,
-        bore=bore,
-        sign_speed=sign_speed,
-        rig=kind,
-        logged=logged,
         imposed=True,
-    )
-
-
-def rig_mechanism(cylinder: Cylinder) -> Mechanism:
-    """A piston on the bench: one coordinate, its extension `piston/x` [m], massless."""
-    q, v, a = ca.SX.sym("q"), ca.SX.sym("v"), ca.SX.sym("a")
-    x = Quantity("piston/x", "m", 0.0, cylinder.stroke, 0.02, doc="piston extension, 0 retracted")
-    rate = Quantity("piston/v", "m.s-1", -5.0, 5.0, 0.5, doc="piston rate")
-    return Mechanism(
-        name="rig",
-        q=q,
-        v=v,
-        a=a,
-        coordinates=(x,),
-        velocities=(rate,),
-        inverse_dynamics=ca.SX.zeros(1),
-        ports={"piston/x": Port(x, rate, q)},
-        legs=("",),
-        gravity=0.0,  # nothing hangs on the rod
-        cylinder=cylinder,
-        imposed=True,
+        **facts,
     )

@@ -12,7 +12,7 @@ from pydantic import Field
 from kemba.config import Document, Section, find_config, is_file, load_yaml, parse, shipped_configs
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.gas import VesselChamber
 from kemba.effects.rigs.axis import DriveAxis
 from kemba.effects.rigs.chambers import MeasuredChambers

@@ -14,7 +14,7 @@ from kemba.ocp.planned import Plan, judge
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.relaxation.lifting import confirm, grow, resumed
 from kemba.ocp.relaxation.schedule import (
-    METHODS,
+    PENALTIES,
     RELAX,
     binary,
     find,
@@ -155,7 +155,7 @@ class Planner:
         """The result of the first strategy that solves, else of the first one; the best iterate of
         a solve that was stopped."""
         try:
-            if self.task.method in METHODS:
+            if self.task.method in PENALTIES:
                 return self.penalty()
             first = None
             for strategy in self.strategies():

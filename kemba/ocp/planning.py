@@ -59,7 +59,12 @@ class Planning:
         start: Trajectory | None = None,
         stop: Callable[[], bool] | None = None,
     ) -> Planning:
-        """The planning of a task, as `plan`. Raises ConfigErrors for wrong names and units."""
+        """The planning of a task. Raises ConfigErrors for wrong names, units and solver options.
+
+        `log` collects IPOPT's text, `tell` gets the name of every solve, `watch` is called after
+        every iteration; `start` is a trajectory to begin with; `stop` is asked after every
+        iteration whether to end.
+        """
         document = document or Document(task.model_dump())
         deadline = time.monotonic() + task.solver.time_limit
         building, clock = Stopwatch(), Stopwatch()
@@ -146,26 +151,16 @@ class Planning:
 
 
 def plan(
-    task: Task,
-    document: Document | None = None,
-    model: str | Path | None = None,
-    log: Path | None = None,
-    tell: Tell = silent,
-    watch: Watch | None = None,
-    start: Trajectory | None = None,
-    stop: Callable[[], bool] | None = None,
-    origin: Origin | None = None,
+    task: Task, document: Document | None = None, origin: Origin | None = None, **how: Any
 ) -> Plan:
     """Solve a task. Never raises for a task that cannot be met: the status says so.
 
-    Raises ConfigErrors for wrong names, units and solver options. `log` collects IPOPT's text,
-    `tell` gets the name of every solve, `watch` is called after every iteration; `start` is a
-    trajectory to begin with; `stop` is asked after every iteration whether to end. `origin`: an
-    earlier plan that is solved again for the changed figures; where that fails, the plan is made
-    from scratch, and `Plan.continued` is False.
+    `how`: what `Planning.of` takes. `origin`: an earlier plan that is solved again for the changed
+    figures; where that fails, the plan is made from scratch, and `Plan.continued` is False. Raises
+    ConfigErrors for wrong names, units and solver options.
     """
     first: Plan | None = None
-    for found in Planning.of(task, document, model, log, tell, watch, start, stop).plans(origin):
+    for found in Planning.of(task, document, **how).plans(origin):
         first = first or found
         if found.status is Status.SOLVED:
             return found

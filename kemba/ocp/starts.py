@@ -16,16 +16,8 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.task.task import Task
-from kemba.settings import Settings, setting
 
-
-class SeveralStarts(Settings):
-    """Several starts of one task."""
-
-    noise: float = setting(
-        0.25, "1", "guess noise of all starts but the first, which has the task's own",
-        "convention: a quarter of every scale, so that starts end in other minima",
-    )  # fmt: skip
+NOISE = 0.25  # of the guess of all starts but the first: of every scale, so that minima differ
 
 
 @dataclass(frozen=True)
@@ -50,9 +42,8 @@ def plan_best(
     The best one is solved once more from its own guess in this process: a plan's functions do not
     travel between processes. Raises as `plan` does.
     """
-    noise = SeveralStarts.current().noise
     tasks = [
-        task.model_copy(update={"guess_noise": max(task.guess_noise, noise * (i > 0)), "seed": i})
+        task.model_copy(update={"guess_noise": max(task.guess_noise, NOISE * (i > 0)), "seed": i})
         for i in range(starts)
     ]
     found: list[Start] = []

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.effects.mechanics.motor import Motor
+from kemba.effects.mechanics.hip import Motor
 from kemba.errors import KembaError
 from kemba.events import STANDS
 from kemba.model import Model
@@ -48,27 +48,14 @@ class Execution:
 
 
 def execute(
-    controller: Trajectory | str | Path,
-    model: Model,
-    gains: Gains | None = None,
-    step: float | None = None,
-    extra: float = 0.0,
-    start: dict[str, float] | None = None,
-    dead_time: bool = True,
-    valves: Mapping[str, Profile] | None = None,
-    sample: float | Array = 1e-3,
+    controller: Trajectory | str | Path, model: Model, *arguments: Any, **named: Any
 ) -> Execution:
     """Play a controller table (a run folder, `controller.csv`, or its trajectory) on `model`.
 
-    The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-    the air is held until plan time 0, and one with a rate in `start` has it at that time; its
-    motion begins there. After the last row the last commands
-    stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the table lacks a
-    column.
+    Further arguments are those of `condition_of`. Raises KembaError when the table lacks a column.
     """
     table = read_controller(controller)
-    case = condition_of(table, model, gains, step, extra, start, dead_time, valves, sample)
-    condition, begin = case
+    condition, begin = condition_of(table, model, *arguments, **named)
     return Execution(later(simulate_one(condition), begin), table)
 
 
@@ -102,7 +89,10 @@ def condition_of(
 ) -> tuple[Condition, float]:
     """What `execute` simulates, and when [s] by the table's clock it begins.
 
-    Raises KembaError when the table lacks a column.
+    The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
+    the air is held until plan time 0, and one with a rate in `start` has it at that time; its
+    motion begins there. After the last row the last commands stay for `extra` [s]. `valves` replace
+    the table's. Raises KembaError when the table lacks a column.
     """
     gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
     profiles = {

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from kemba.config import Document, FileName, Section, find_config, load_yaml, parse
+from kemba.config import FileName, Section, find_config, load_yaml, parse
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.model.rest import at_rest
@@ -376,12 +376,7 @@ class RigFile(Section):
 
 def load_rig(name: str | Path) -> Rig:
     """The rig of a YAML file, or a shipped one. Raises KembaError with every mistake."""
-    return parse_rig(load_yaml(find_config(name, "rigs")))
-
-
-def parse_rig(document: Document) -> Rig:
-    """The rig a document describes. Raises KembaError with every mistake."""
-    return parse(document, RigFile).rig
+    return parse(load_yaml(find_config(name, "rigs")), RigFile).rig
 
 
 def bench_model(name: str | Path, supply: float) -> Model:

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from threading import Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -103,7 +103,14 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Condition:
-    """One of many simulations: the arguments of `simulate`."""
+    """A simulation of `model` for `duration` [s].
+
+    `initial`: coordinates, velocities and effect states by column name; the standing pose at rest
+    stands for what is missing. Steps are as long as the motion allows; `step` [s] makes them equal
+    and no longer than that. Valve switchings, controller ticks and impacts end steps exactly.
+    `sample` [s], or the times themselves (m,). `dead_time`: valves act later than sent, by the
+    model's own timing; their columns show them as sent. Values at a sample hold just after it.
+    """
 
     model: Model
     initial: Mapping[str, float] | None = None
@@ -114,39 +121,17 @@ class Condition:
     dead_time: bool = True
 
 
-def simulate(
-    model: Model,
-    initial: Mapping[str, float] | None = None,
-    commands: Commands | None = None,
-    duration: float = 1.0,
-    step: float | None = None,
-    sample: float | Array = 1e-3,
-    dead_time: bool = True,
-) -> Trajectory:
-    """The motion of `model` for `duration` [s] with every output, state, input and force.
+def simulate(model: Model, *arguments: Any, **named: Any) -> Trajectory:
+    """The motion with every output, state, input and force; arguments are those of `Condition`.
 
-    `initial`: coordinates, velocities and effect states by column name; the standing pose at rest
-    stands for what is missing. Steps are as long as the motion allows; `step` [s] makes them equal
-    and no longer than that. Valve switchings, controller ticks and impacts end steps exactly.
-    `sample` [s], or the times themselves (m,). `dead_time`: valves act later than sent, by the
-    model's own timing; their columns show them as sent. Values at a sample hold just after it.
     Raises KembaError on unknown names and on models without free motion.
     """
-    return run(model, initial, commands, duration, step, sample, dead_time).trajectory
+    return run(model, *arguments, **named).trajectory
 
 
-def run(
-    model: Model,
-    initial: Mapping[str, float] | None = None,
-    commands: Commands | None = None,
-    duration: float = 1.0,
-    step: float | None = None,
-    sample: float | Array = 1e-3,
-    dead_time: bool = True,
-) -> Simulated:
-    """As `simulate`, with the impacts that happened; `sample` [s] or the times (m,)."""
-    condition = Condition(model, initial, commands, duration, step, sample, dead_time)
-    return simulate_one(condition)
+def run(model: Model, *arguments: Any, **named: Any) -> Simulated:
+    """As `simulate`, with the impacts that happened."""
+    return simulate_one(Condition(model, *arguments, **named))
 
 
 def simulate_one(condition: Condition) -> Simulated:

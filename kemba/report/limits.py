@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from kemba.effects.mechanics.motor import Motor
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.mechanics.hip import Motor
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.mechanism import Cylinder
 from kemba.model import Model
 from kemba.plotting.source import Machine

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.config import Document
-from kemba.files import write_error
+from kemba.files import write_error, write_json
 from kemba.folders import fresh
 from kemba.model import Model
 from kemba.ocp import Task, load_task, task_model
@@ -24,7 +24,7 @@ from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.settings import Relaxation
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.parameters import Parameters
-from kemba.runs import load_run, write_json
+from kemba.runs import load_run
 from kemba.sensitivity.replanned import PlanProgram
 from kemba.trajectory import Trajectory
 

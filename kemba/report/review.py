@@ -46,7 +46,7 @@ from kemba.report.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs,
 from kemba.report.view import page_text, stage, write_page
 from kemba.runs import Run, load_run
 from kemba.scene import FLAT, Scene, scene_in
-from kemba.settings import CHOSEN, Settings, setting
+from kemba.settings import Settings, setting
 from kemba.solve.verdict import EXECUTIONS
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
@@ -111,6 +111,10 @@ POLICY = "policy.npz"
 OPEN = "SHARE of the time in which valves are open"
 
 
+STEP = 5e-4  # s, between the commands that are compared
+TICK = 1e-3  # s, period of the controller, by which edges may be off
+
+
 class BelongingSettings(Settings):
     """When the commands of a log are not those of a run."""
 
@@ -118,8 +122,6 @@ class BelongingSettings(Settings):
         0.02, "1", "of the time in which valves are open, with another command than the run's",
         "tuned: own logs of five simulated runs 0, jumps to 0.50 and 0.51 m 0.05", decides=True,
     )  # fmt: skip
-    step: float = setting(5e-4, "s", "between the times that are compared", CHOSEN)
-    tick: float = setting(1e-3, "s", "period of the controller, by which edges may be off", CHOSEN)
 
 
 @dataclass(frozen=True)
@@ -171,14 +173,14 @@ def _reason(log: Trajectory, run: Run, made_of: str, share: float | None) -> str
 def other_commands(log: Trajectory, table: Trajectory, moved: float = 0.0) -> float | None:
     """The share of the time in which valves are open where the log holds another command than the
     table; None without commands. Edges may be off by a sample, a tick and `moved` [s]."""
-    settings, shown = BelongingSettings.current(), in_plans_clock(log, table)
+    shown = in_plans_clock(log, table)
     names = [name for name in table.names if "/valve/" in name and name in shown]
     sent = table.time + start_of(table) - table.time[0]
     begin, end = max(sent[0], shown.time[0]), min(sent[-1], shown.time[-1])
     if not names or end <= begin:
         return None
-    grid = np.arange(begin, end, settings.step)
-    off = moved + settings.tick + float(np.median(np.diff(shown.time)))
+    grid = np.arange(begin, end, STEP)
+    off = moved + TICK + float(np.median(np.diff(shown.time)))
     wrong, is_open = 0, 0
     for name in names:
         ours = _held(sent, table[name], grid)
@@ -361,7 +363,11 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
         parts.append(folded("Plan in numbers", f'<div class="facts">{facts}</div>', not given.logs))
         parts += list(origin(given.run))
     if tracks:
-        parts.append(_scripts(book))
+        parts.append(
+            f"<style>{page_text('uplot.min.css')}</style>\n"
+            f"<script>/*!\n{page_text('uplot.LICENSE')}\n*/\n{page_text('uplot.min.js')}</script>\n"
+            f"<script>{page_text('charts.js')}charts({book.data()});</script>"
+        )
     return _title(given), "\n".join(part for part in parts if part), verdict
 
 
@@ -464,12 +470,3 @@ def _title(given: Material) -> str:
     if given.answer:
         parts.append(given.answer_folder.resolve().name)
     return " · ".join(parts)
-
-
-def _scripts(book: Book) -> str:
-    """The library with its licence notice, our script and the numbers."""
-    return (
-        f"<style>{page_text('uplot.min.css')}</style>\n"
-        f"<script>/*!\n{page_text('uplot.LICENSE')}\n*/\n{page_text('uplot.min.js')}</script>\n"
-        f"<script>{page_text('charts.js')}charts({book.data()});</script>"
-    )

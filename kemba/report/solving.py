@@ -17,15 +17,15 @@ from dataclasses import replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from kemba.config import Document, dump_yaml
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
-from kemba.files import WriteError
+from kemba.files import WriteError, write_json
 from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.origin import write_stages
-from kemba.runs import PLANT_RUN, STAGES, RunFolder, write_json
+from kemba.runs import PLANT_RUN, STAGES, RunFolder
 from kemba.solve import Approach, best_plan
 from kemba.solve.listener import Listener
 from kemba.solve.memory import remember
@@ -36,38 +36,18 @@ FIGURE = "figure.png"
 Order = tuple[Trajectory, Path]  # a plan, and its run folder
 
 
-class Drawer(Protocol):
-    """What draws the figure of a plan."""
-
-    def begin(self, plan: Trajectory, folder: Path) -> None:
-        """A plan is known; its figure is for `folder`, which has a `task.yaml`. The last one of
-        several stays."""
-
-    def finish(self) -> None:
-        """Return when the figure is written. Raises KembaError where it cannot be."""
-
-
-class Nowhere:
-    """Draws nothing."""
-
-    def begin(self, plan: Trajectory, folder: Path) -> None:
-        """See `Drawer`."""
-
-    def finish(self) -> None:
-        """See `Drawer`."""
-
-
 class Here:
-    """Draws in this process, when the figure is asked for."""
+    """Draws the figure of a plan, in this process, when it is asked for."""
 
     order: Order | None = None
 
     def begin(self, plan: Trajectory, folder: Path) -> None:
-        """See `Drawer`."""
+        """A plan is known; its figure is for `folder`, which has a `task.yaml`. The last one of
+        several stays."""
         self.order = plan, folder
 
     def finish(self) -> None:
-        """See `Drawer`. Raises KembaError where the figure cannot be written."""
+        """Return when the figure is written. Raises KembaError where it cannot be."""
         if self.order is not None:
             draw_plan(*self.order)
 
@@ -88,14 +68,14 @@ class Beside(Here):
         theirs.close()
 
     def begin(self, plan: Trajectory, folder: Path) -> None:
-        """See `Drawer`."""
+        """See `Here`."""
         super().begin(plan, folder)
         self.begun += 1
         with suppress(OSError):  # it is dead: `finish` notices
             self.pipe.send(self.order)
 
     def finish(self) -> None:
-        """See `Drawer`. Raises KembaError where the figure cannot be written."""
+        """See `Here`."""
         error: KembaError | None = None
         try:
             for _ in range(self.begun):
@@ -114,7 +94,7 @@ class Beside(Here):
 
 
 @contextmanager
-def drawer(wanted: bool) -> Iterator[Drawer]:
+def drawer(wanted: bool) -> Iterator[Here]:
     """What draws the figure of a command: a second process where there is a core for it.
 
     In a process that has loaded matplotlib already, drawing there costs less.
@@ -165,7 +145,7 @@ def solve_into(
     listener: Listener,
     approach: Approach | None = None,
     figure: bool = True,
-    drawer: Drawer | None = None,
+    drawer: Here | None = None,
 ) -> dict[str, Any]:
     """Solve `task` and fill its run folder; returns the JSON of `solve`.
 
@@ -174,10 +154,11 @@ def solve_into(
     """
     dump_yaml(task.model_dump(exclude_none=True, by_alias=True), folder / "task.yaml")
     approach = replace(approach or Approach(), log=folder / "solver.log")
-    drawing = (drawer or Here()) if figure else Nowhere()
+    drawing = (drawer or Here()) if figure else None
 
     def begun(plan: Trajectory) -> None:
-        drawing.begin(plan, folder.path)
+        if drawing is not None:
+            drawing.begin(plan, folder.path)
 
     try:
         best = best_plan(task, document, approach, listener, begun, str(folder.path))
@@ -199,12 +180,13 @@ def solve_into(
 
 
 def _keep(
-    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, drawing: Drawer
+    found: Plan, result: dict[str, Any], motions: Motions, folder: RunFolder, drawing: Here | None
 ) -> None:
     """Write the run folder; when that fails, write the plan elsewhere and say where."""
     try:
         _write(found, result, motions, folder.path)
-        drawing.finish()
+        if drawing is not None:
+            drawing.finish()
     except WriteError as error:
         elsewhere = Path(tempfile.mkdtemp(prefix="kemba-kept-"))
         try:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.effects.mechanics.contact import Contact
-from kemba.effects.mechanics.motor import Motor
-from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, TEMPERATURE
+from kemba.effects.mechanics.ground import Contact
+from kemba.effects.mechanics.hip import Motor
+from kemba.effects.pneumatics.flow import ATMOSPHERE, GAS, TEMPERATURE
 from kemba.identify.problem.noise import difference_sigma
 from kemba.mechanism import Cylinder
 from kemba.model import Model

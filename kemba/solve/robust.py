@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kemba.effects.mechanics.contact import Contact
+from kemba.effects.mechanics.ground import Contact
 from kemba.model import Model
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.asked import grip_of

@@ -135,7 +135,7 @@ def run_on_plant(work: Work) -> Replay:
     done = execute(
         table,
         model,
-        Gains(conditions.gains.K_p, conditions.gains.K_d),
+        gains=Gains(conditions.gains.K_p, conditions.gains.K_d),
         extra=conditions.after,
         start=standing(model, table, start_offsets(model, conditions)),
         valves=scattered(model, table, conditions.jitter, rng) if conditions.jitter else None,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kemba.contract.cases import example, points, slopes, values_of
-from kemba.effects.catalogue import DRIVE, MISSING, SENSORS, Expression
+from kemba.effects.catalogue import DRIVE, MISSING, SENSORS
+from kemba.effects.expression import Expression
 from kemba.effects.pneumatics.gas import GasTemperature
 from kemba.model import Model, load_spec
 from kemba.model.spec import build_model

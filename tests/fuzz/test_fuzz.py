@@ -111,7 +111,7 @@ def test_the_rule_sees_what_breaks_it(tmp_path: Path, monkeypatch: pytest.Monkey
     words = {crash: "crash: ", hang: "hang: more than 0.2 CPU s", silent: "no place: elsewhere"}
     monkeypatch.setitem(__import__("fuzz.rule", fromlist=["x"]).LONGEST, "check", 0.2)
     for broken, said in words.items():
-        monkeypatch.setattr("kemba.config.locate", broken)
+        monkeypatch.setattr("kemba.config.find_config", broken)
         assert outcome("check", file).broken.startswith(said)
 
 

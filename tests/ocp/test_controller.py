@@ -7,7 +7,7 @@ import pytest
 from ocp.runs import QUICK, Solved, solved
 
 from kemba.effects import Effect
-from kemba.effects.pneumatics.timing import ValveCloseDelay
+from kemba.effects.pneumatics.valve import ValveCloseDelay
 from kemba.model import load_model
 from kemba.ocp import controller_table
 from kemba.ocp.controller import _means

@@ -9,9 +9,8 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
-from kemba.ocp.functions.code import Code, code_of, vectorised
-from kemba.ocp.functions.proximal import Proximal, regularised_hessian
-from kemba.ocp.functions.settings import Functions, Newton
+from kemba.ocp.functions.code import FEW, Code, Functions, code_of, vectorised
+from kemba.ocp.functions.proximal import Newton, Proximal, regularised_hessian
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
@@ -30,7 +29,7 @@ def half() -> Transcription:
     return Transcription(model, task, resolve(task, model, document), reduction, 24)
 
 
-@pytest.mark.parametrize("points", [1, Functions.current().few, POINTS])
+@pytest.mark.parametrize("points", [1, FEW, POINTS])
 def test_abreast_is_the_same_to_the_last_bit(half: Transcription, points: int) -> None:
     block, rng = half.problem.blocks[0].code, np.random.default_rng(0)
     at = [block.z, block.given]

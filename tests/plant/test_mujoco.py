@@ -10,7 +10,7 @@ import casadi as ca
 import mujoco
 import numpy as np
 
-from kemba.effects.mechanics.contact import Contact
+from kemba.effects.mechanics.ground import Contact
 from kemba.mechanism import Link, Robot, load_robot, robot_mechanism
 from kemba.mechanism.robot import tree_angles
 from kemba.model import Model

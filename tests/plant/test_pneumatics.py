@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.orifice import OrificeChamber
-from kemba.effects.pneumatics.supply_line import SupplyLine
+from kemba.effects.pneumatics.supply import SupplyLine
 from kemba.effects.pneumatics.valve import Valve
 from kemba.mechanism import load_cylinder, rig_mechanism
 from kemba.model import Model

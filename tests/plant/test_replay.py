@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from plant.scripts import jump, planning
 
-from kemba.effects.mechanics.motor import Motor
+from kemba.effects.mechanics.hip import Motor
 from kemba.plant.certificate import replays
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.controller import Gains, execute, hip_control, motor_limits

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.effects.pneumatics.timing import ValveCloseDelay
+from kemba.effects.pneumatics.valve import ValveCloseDelay
 from kemba.model import load_model
 from kemba.plant.commands import Profile, acting
 from kemba.plant.rigs import drive, locked

@@ -242,7 +242,7 @@ def test_a_plan_that_asks_too_much_is_told_what_can_be_reached() -> None:
 
 
 def test_the_motor_gives_less_at_speed() -> None:
-    from kemba.effects.mechanics.motor import Motor
+    from kemba.effects.mechanics.hip import Motor
 
     motor = Motor()
     torque = np.array([motor.tau_peak, motor.tau_rated, -motor.tau_rated])

@@ -9,7 +9,7 @@ import pytest
 
 from kemba.config import shipped_configs
 from kemba.effects.pneumatics.chamber import Chamber
-from kemba.effects.pneumatics.timing import ValveDelay
+from kemba.effects.pneumatics.valve import ValveDelay
 from kemba.errors import KembaError
 from kemba.mechanism.robot import link_regressors
 from kemba.model import Model, load_model

@@ -44,7 +44,7 @@ def refused(folder: Path, scene: str, *options: str) -> str:
         ("obstacles:\n  - {from: 0.3 m, to: 0.4 kg, height: 0.2 m}\n", 1,
          "obstacles[0].to: '0.4 kg' is a mass"),
         ("terrain:\n  - {from: 0.3 m, height: 5 deg}\n", 1, "a length such as"),
-        ("terrain:\n  - {from: 0.3 m}\n", 1, "one of height, slope, friction is expected"),
+        ("terrain:\n  - {from: 0.3 m}\n", 1, "one of slope, height, friction is expected"),
     ],
 )  # fmt: skip
 def test_a_wrong_scene_is_refused_at_its_line(

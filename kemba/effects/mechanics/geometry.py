@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated
 
 from pydantic import field_validator
 
-from kemba.effects.base import Effect
+from kemba.effects.base import Deviation
 from kemba.errors import suggest
 from kemba.quantity import Param
 
@@ -15,7 +15,7 @@ from kemba.quantity import Param
 SIZES = {"femur/length": 6e-3, "tibia/length": 6e-3, "piston/mount": 1e-3, "piston/pin": 1e-3}
 
 
-class Geometry(Effect):
+class Geometry(Deviation):
     """A length of every leg differs from the robot's file; masses stay, and stay where they are.
 
     `part`: `femur/length` (hip to knee), `tibia/length` (knee to foot), `piston/mount` (the
@@ -23,15 +23,13 @@ class Geometry(Effect):
     loop at the knee follow. Its size is 6 mm for the links and 1 mm at the piston.
     """
 
-    kind: Literal["geometry"] = "geometry"
     part: str
     d: Annotated[float, Param("m", 6e-3, doc="true length minus that of the robot's file")] = 0.0
 
-    place: ClassVar[Literal["leg", "body"]] = "body"
-    family: ClassVar[str] = "geometry"
-    equation: ClassVar[str] = "length -> length + d in every kinematic relation"
-    source: ClassVar[str] = "kinematics of the link table; tolerances of making and mounting"
-    off: ClassVar[dict[str, float]] = {"d": 0.0}
+    place = "body"
+    family = "geometry"
+    equation = "length -> length + d in every kinematic relation"
+    source = "kinematics of the link table; tolerances of making and mounting"
 
     @field_validator("part")
     @classmethod

@@ -1,80 +1,95 @@
-"""The hip joint and its motor, beyond the ideal torque source."""
+"""The hip joint and its quasi-direct-drive motor."""
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
-from kemba.effects.base import At, Contribution, Effect, Signal
+from kemba.effects.base import At, Contribution, Effect, HipEffect, Signal
 from kemba.effects.mechanics.laws import coulomb, viscous
 from kemba.quantity import Param, Quantity
+
+
+class Motor(Effect):
+    """Ideal torque source at the hip; the speed it can drive falls linearly with torque."""
+
+    tau_peak: Annotated[float, Param("N.m", 1.0, lower=0.0, doc="peak torque")] = 24.8
+    w_noload: Annotated[float, Param("rad.s-1", 1.0, lower=0.0, doc="no-load speed")] = 49.7
+    tau_rated: Annotated[float, Param("N.m", 1.0, lower=0.0, doc="rated torque")] = 8.3
+    w_rated: Annotated[float, Param("rad.s-1", 1.0, lower=0.0, doc="speed at rated torque")] = 41.9
+
+    family = "hip"
+    equation = "tau, |tau| <= tau_peak, +-w <= w_noload - slope (+-tau)"
+    source = "paper II-A (peak, no-load); authors' program (rated point)"
+    ports = ("hip",)
+    mirror: ClassVar[dict[str, str]] = {"tau": "-tau"}
+
+    def inputs(self) -> dict[str, Quantity]:
+        peak = self.tau_peak
+        return {"tau": Quantity("hip/tau", "N.m", -peak, peak, 10.0, doc="hip torque")}
+
+    def evaluate(self, at: At) -> Contribution:
+        slope = (self.w_noload - self.w_rated) / self.tau_rated
+        w, tau = at.hip.v, at.tau
+        return Contribution(
+            effort={"hip": tau},
+            limits={
+                "speed_forward": (self.w_noload - slope * tau - w) / self.w_noload,
+                "speed_backward": (self.w_noload + slope * tau + w) / self.w_noload,
+            },
+        )
+
 
 W_COULOMB = 0.1  # rad.s-1
 
 
-class HipFriction(Effect):
+class HipFriction(HipEffect):
     """Coulomb friction of gear and bearings."""
 
-    kind: Literal["hip_friction"] = "hip_friction"
     T_c: Annotated[float, Param("N.m", 0.6, lower=0.0, doc="Coulomb torque")] = 0.0
 
-    family: ClassVar[str] = "hip"
-    equation: ClassVar[str] = "-T_c tanh(w/0.1)"
-    source: ClassVar[str] = "planetary gear, 10:1"
-    ports: ClassVar[tuple[str, ...]] = ("hip",)
-    off: ClassVar[dict[str, float]] = {"T_c": 0.0}
-    dissipative: ClassVar[bool] = True
+    equation = "-T_c tanh(w/0.1)"
+    source = "planetary gear, 10:1"
+    dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"hip": coulomb(self.T_c, at.hip.v, W_COULOMB)})
 
 
-class HipDamping(Effect):
+class HipDamping(HipEffect):
     """Viscous loss of gear, grease and motor."""
 
-    kind: Literal["hip_damping"] = "hip_damping"
     b: Annotated[float, Param("N.m.s.rad-1", 0.1, doc="damping")] = 0.0
 
-    family: ClassVar[str] = "hip"
-    equation: ClassVar[str] = "-b w"
-    source: ClassVar[str] = "planetary gear, 10:1"
-    ports: ClassVar[tuple[str, ...]] = ("hip",)
-    off: ClassVar[dict[str, float]] = {"b": 0.0}
-    dissipative: ClassVar[bool] = True
+    equation = "-b w"
+    source = "planetary gear, 10:1"
+    dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"hip": viscous(self.b, at.hip.v)})
 
 
-class TorqueScale(Effect):
+class TorqueScale(HipEffect):
     """The motor's torque constant differs from the one the command assumes."""
 
-    kind: Literal["torque_scale"] = "torque_scale"
     k: Annotated[float, Param("1", 0.1, lower=0.0, doc="torque per command, nominal 1")] = 1.0
 
-    family: ClassVar[str] = "hip"
-    equation: ClassVar[str] = "tau -> k tau"
-    source: ClassVar[str] = "torque constants are given to about 10 %"
-    ports: ClassVar[tuple[str, ...]] = ("hip",)
-    off: ClassVar[dict[str, float]] = {"k": 1.0}
+    equation = "tau -> k tau"
+    source = "torque constants are given to about 10 %"
 
     def signals(self, at: At) -> dict[str, Signal]:
         return {"tau": Signal(gain=self.k)}
 
 
-class MotorLag(Effect):
+class MotorLag(HipEffect):
     """Current control follows the (scaled) command with a lag.
 
     T = 0.1 ms, the smallest allowed, is as good as no lag.
     """
 
-    kind: Literal["motor_lag"] = "motor_lag"
     T: Annotated[float, Param("s", 0.005, lower=1e-4, doc="time constant")] = 1e-4
 
-    family: ClassVar[str] = "hip"
-    equation: ClassVar[str] = "T dtau_a/dt = tau - tau_a, tau_a acts on the joint"
-    source: ClassVar[str] = "bandwidth of the motor's current loop and bus"
-    ports: ClassVar[tuple[str, ...]] = ("hip",)
-    off: ClassVar[dict[str, float]] = {"T": 1e-4}
+    equation = "T dtau_a/dt = tau - tau_a, tau_a acts on the joint"
+    source = "bandwidth of the motor's current loop and bus"
     mirror: ClassVar[dict[str, str]] = {"tau_a": "-tau_a"}
 
     def states(self) -> dict[str, Quantity]:
@@ -87,35 +102,27 @@ class MotorLag(Effect):
         return Contribution(rate={"tau_a": (at.source("tau") - at.tau_a) / self.T})
 
 
-class HipSpring(Effect):
+class HipSpring(HipEffect):
     """A spring that pulls the hip towards q0: cables and hoses. q0 unless given: standing."""
 
-    kind: Literal["hip_spring"] = "hip_spring"
     k: Annotated[float, Param("N.m.rad-1", 1.5, lower=0.0, doc="stiffness")] = 0.0
     q0: Annotated[float, Param("rad", doc="angle at rest")] | None = None
 
-    family: ClassVar[str] = "hip"
-    equation: ClassVar[str] = "-k (q - q0)"
-    source: ClassVar[str] = "stiffness of cables and hoses across the joint"
-    ports: ClassVar[tuple[str, ...]] = ("hip",)
-    off: ClassVar[dict[str, float]] = {"k": 0.0}
+    equation = "-k (q - q0)"
+    source = "stiffness of cables and hoses across the joint"
 
     def evaluate(self, at: At) -> Contribution:
         q0 = at.standing("hip/q") if self.q0 is None else self.q0
         return Contribution(effort={"hip": -self.k * (at.hip.x - q0)})
 
 
-class RotorInertia(Effect):
+class RotorInertia(HipEffect):
     """Inertia of rotor and gear seen at the joint, beside the one in the robot's link table."""
 
-    kind: Literal["rotor_inertia"] = "rotor_inertia"
     J: Annotated[float, Param("kg.m2", 0.01, lower=0.0, doc="inertia at the joint")] = 0.0
 
-    family: ClassVar[str] = "hip"
-    equation: ClassVar[str] = "-J dw/dt"
-    source: ClassVar[str] = "rotor inertia times the gear ratio squared"
-    ports: ClassVar[tuple[str, ...]] = ("hip",)
-    off: ClassVar[dict[str, float]] = {"J": 0.0}
+    equation = "-J dw/dt"
+    source = "rotor inertia times the gear ratio squared"
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"hip": -self.J * at.hip.a})

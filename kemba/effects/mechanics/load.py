@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any
 
 import casadi as ca
 
-from kemba.effects.base import At, Contribution, Effect
+from kemba.effects.base import At, BodyEffect, Contribution
 from kemba.quantity import Param
 
 
-class Payload(Effect):
+class Payload(BodyEffect):
     """A point mass at the body's centre: inertia and weight."""
 
-    kind: Literal["payload"] = "payload"
     m: Annotated[float, Param("kg", 0.3, lower=0.0, doc="mass")] = 0.0
 
-    place: ClassVar[Literal["leg", "body"]] = "body"
-    family: ClassVar[str] = "body"
-    equation: ClassVar[str] = "-m ax on x, -m (az + g) on z"
-    source: ClassVar[str] = "point mass"
-    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z")
-    off: ClassVar[dict[str, float]] = {"m": 0.0}
+    equation = "-m ax on x, -m (az + g) on z"
+    source = "point mass"
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(
@@ -30,22 +25,18 @@ class Payload(Effect):
         )
 
 
-class ComOffset(Effect):
+class ComOffset(BodyEffect):
     """The body link's mass M sits d forward of the body's centre.
 
     Its d'Alembert and weight forces at the offset point, less those at the centre, where the
     link table has them.
     """
 
-    kind: Literal["com_offset"] = "com_offset"
     d: Annotated[float, Param("m", 0.02, doc="forward offset along the body")] = 0.0
 
-    place: ClassVar[Literal["leg", "body"]] = "body"
-    family: ClassVar[str] = "body"
-    equation: ClassVar[str] = "M at (d cos pitch, d sin pitch) from the body's centre, not at it"
-    source: ClassVar[str] = "rigid-body kinematics; M = 2.886 kg (authors' program)"
-    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z", "pitch")
-    off: ClassVar[dict[str, float]] = {"d": 0.0}
+    equation = "M at (d cos pitch, d sin pitch) from the body's centre, not at it"
+    source = "rigid-body kinematics; M = 2.886 kg (authors' program)"
+    ports = ("body_x", "body_z", "pitch")
 
     def evaluate(self, at: At) -> Contribution:
         M, spin, turn = at.body_mass, at.pitch.v**2, at.pitch.a
@@ -59,22 +50,18 @@ class ComOffset(Effect):
         )
 
 
-class MassSplit(Effect):
+class MassSplit(BodyEffect):
     """Mass that is in the legs and not in the body: the robot weighs what its file says.
 
     m leaves the body and is spread over the links of all legs as these are heavy. Every link keeps
     its shape and its centre of mass; its moment of inertia grows with its mass.
     """
 
-    kind: Literal["mass_split"] = "mass_split"
     m: Annotated[float, Param("kg", 0.2, doc="mass in the legs instead of the body")] = 0.0
 
-    place: ClassVar[Literal["leg", "body"]] = "body"
-    family: ClassVar[str] = "body"
-    equation: ClassVar[str] = "M -> M - m, each link of a leg -> (1 + m / all of them) times it"
-    source: ClassVar[str] = "link table: weighed as a whole, split by CAD"
-    ports: ClassVar[tuple[str, ...]] = ("body_x", "body_z", "pitch")
-    off: ClassVar[dict[str, float]] = {"m": 0.0}
+    equation = "M -> M - m, each link of a leg -> (1 + m / all of them) times it"
+    source = "link table: weighed as a whole, split by CAD"
+    ports = ("body_x", "body_z", "pitch")
 
     @property
     def geometry(self) -> Mapping[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from typing_extensions import Self
 
@@ -35,19 +35,18 @@ class Chamber(Effect):
     robot's cylinder.
     """
 
-    kind: Literal["chamber"] = "chamber"
     pressures: tuple[Pascal, ...] | None = None
     F_extend: tuple[Newton, ...] | None = None
     F_retract: tuple[Newton, ...] | None = None
     fill: tuple[Second, Second] | None = None
     vent: tuple[Second, Second] | None = None
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = "F = F_static u - tau(u, x) dF/dt; effort F_e - F_r"
-    source: ClassVar[str] = "paper eq. 4, 5, Tables I, II"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    reads: ClassVar[tuple[str, ...]] = ("supply_gain", "droop", "rise_gain")
-    publishes: ClassVar[tuple[str, ...]] = ("F_static_e", "F_static_r", "tau_e", "tau_r")
+    family = "air"
+    equation = "F = F_static u - tau(u, x) dF/dt; effort F_e - F_r"
+    source = "paper eq. 4, 5, Tables I, II"
+    ports = ("piston",)
+    reads = ("supply_gain", "droop", "rise_gain")
+    publishes = ("F_static_e", "F_static_r", "tau_e", "tau_r")
 
     nominal: ClassVar[dict[str, Tolerance]] = {
         "F_extend": OF_A_KIND,

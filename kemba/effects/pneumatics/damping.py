@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from typing_extensions import Self
 
@@ -25,19 +25,18 @@ class ModeDamping(Effect):
     Other figures are those of the robot's cylinder.
     """
 
-    kind: Literal["mode_damping"] = "mode_damping"
     pressures: tuple[Pascal, ...] | None = None
     c_extend: tuple[Damping, ...] | None = None
     c_retract: tuple[Damping, ...] | None = None
     c_both: tuple[Damping, ...] | None = None
     c_none: Annotated[float | None, NONE] = None
 
-    family: ClassVar[str] = "piston"
-    equation: ClassVar[str] = "-c_d(u_e, u_r) v, c_d = c0 + u_e c1 + u_r c2 + u_e u_r c3"
-    source: ClassVar[str] = "paper eq. 6, 7, Table II"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    publishes: ClassVar[tuple[str, ...]] = ("F_mode",)
-    dissipative: ClassVar[bool] = True
+    family = "piston"
+    equation = "-c_d(u_e, u_r) v, c_d = c0 + u_e c1 + u_r c2 + u_e u_r c3"
+    source = "paper eq. 6, 7, Table II"
+    ports = ("piston",)
+    publishes = ("F_mode",)
+    dissipative = True
     nominal: ClassVar[dict[str, Tolerance]] = dict.fromkeys(
         ("c_extend", "c_retract", "c_both", "c_none"),
         Tolerance(2.0, "N.s.m-1", source="assumed: 2 to 3 % of Table II, more of the small c_none"),

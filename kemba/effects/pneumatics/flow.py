@@ -1,4 +1,5 @@
-"""Thin-plate orifice flow of air (paper, eq. 2 and 3), smooth through equal pressures."""
+"""Figures of air, and its flow through a thin-plate orifice (paper, eq. 2 and 3), smooth through
+equal pressures."""
 
 from __future__ import annotations
 
@@ -7,7 +8,11 @@ from typing import Any
 
 import casadi as ca
 
-from kemba.effects.pneumatics.constants import GAS, KAPPA, TEMPERATURE
+ATMOSPHERE = 101325.0  # Pa
+KAPPA = 1.4  # air, ratio of specific heats
+GAS = 287.0  # J.kg-1.K-1, air
+TEMPERATURE = 293.0  # K
+
 
 CHOKED = (2 / (KAPPA + 1)) ** (KAPPA / (KAPPA - 1))  # P_d/P_u = 1/theta = 0.528
 SUBSONIC = math.sqrt(2 * KAPPA / ((KAPPA - 1) * GAS * TEMPERATURE))  # alpha of eq. 3, s.m-1

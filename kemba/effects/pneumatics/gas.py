@@ -6,13 +6,12 @@ An ideal gas of mass m = P V/(R T) and one temperature. What flows out carries i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar
 
 import casadi as ca
 
-from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
-from kemba.effects.pneumatics.flow import phi
+from kemba.effects.base import AirEffect, At, Contribution, Effect
+from kemba.effects.pneumatics.flow import ATMOSPHERE, GAS, KAPPA, TEMPERATURE, phi
 from kemba.quantity import Param, Quantity, Tolerance
 
 ROUND = 0.1  # K; the cube root of a difference of temperatures has an infinite slope at 0
@@ -56,16 +55,14 @@ class GasTemperature(Effect):
     Without it the air that leaves a chamber is taken to be as warm as the supply.
     """
 
-    kind: Literal["gas_temperature"] = "gas_temperature"
-
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = (
+    family = "air"
+    equation = (
         "dT/dt = (mdot_in (kappa T_0 - T) - mdot_out (kappa - 1) T) R T/(P V) - (kappa - 1) T dV/V;"
         " dP/dt + n R (T_0 - T) mdot_out/V"
     )
-    source: ClassVar[str] = "P. Beater, Pneumatic Drives, Springer 2007: energy of a chamber"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    publishes: ClassVar[tuple[str, ...]] = ("gas",)
+    source = "P. Beater, Pneumatic Drives, Springer 2007: energy of a chamber"
+    ports = ("piston",)
+    publishes = ("gas",)
 
     def states(self) -> dict[str, Quantity]:
         return {
@@ -84,29 +81,27 @@ class GasTemperature(Effect):
         return Contribution(rate=rate, add_rate=add, publish={"gas": tuple(gases)})
 
 
-class WallHeat(Effect):
+class WallHeat(AirEffect):
     """Heat that walls give to the air in them by free convection, more to denser air.
 
     h is its coefficient for air of the atmosphere that is 10 K colder than the wall. Needs air with
     a temperature of its own: `gas_temperature` beside orifice chambers, or the vessel of a rig.
     """
 
-    kind: Literal["wall_heat"] = "wall_heat"
     h: Annotated[float, Param("W.m-2.K-1", 5.0, lower=0.0, doc="coefficient at 1 atm and 10 K")] = (
         0.0
     )
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = (
+    equation = (
         "Q = h A_w (rho/rho_atm)^(2/3) (abs(dT)/10)^(1/3) dT, dT = T_w - T; "
         "dP/dt + (kappa - 1) Q/V, dT/dt + (kappa - 1) Q T/(P V)"
     )
-    source: ClassVar[str] = (
+    source = (
         "W. H. McAdams, Heat Transmission, 1954: Nu = 0.13 (Gr Pr)^(1/3); for blow-downs "
         "M. A. Haque et al., Trans. IChemE 70 B, 1992"
     )
-    off: ClassVar[dict[str, float]] = {"h": 0.0}
-    needs: ClassVar[tuple[str, ...]] = ("gas",)
+    ports = ()
+    needs = ("gas",)
 
     def evaluate(self, at: At) -> Contribution:
         add = {}
@@ -127,20 +122,19 @@ class VesselChamber(Effect):
     of the inner wall; `ambient` [K]: its temperature; `outside` [Pa]: pressure behind the hole.
     """
 
-    kind: Literal["vessel_chamber"] = "vessel_chamber"
     V: Annotated[float, Param("m3", 1e-3, lower=1e-9, doc="inside")] = 1e-3
     a: Annotated[float, Param("m2", 1e-6, lower=0.0, doc="effective area of the orifice")] = 1e-6
     wall: float = 0.05
     ambient: float = TEMPERATURE
     outside: float = 101325.0
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = (
+    family = "air"
+    equation = (
         "mdot = a phi(P, P_out) sqrt(T_0/T); dP/dt = -kappa R T mdot/V, "
         "dT/dt = -(kappa - 1) R T^2 mdot/(P V)"
     )
-    source: ClassVar[str] = "paper eq. 1-3 with a temperature: energy balance of a chamber"
-    publishes: ClassVar[tuple[str, ...]] = ("gas",)
+    source = "paper eq. 1-3 with a temperature: energy balance of a chamber"
+    publishes = ("gas",)
     nominal: ClassVar[dict[str, Tolerance]] = {
         "V": Tolerance(0.01, source="assumed: volumes of vessels are known to 1 %"),
         "a": Tolerance(0.05, source="ISO 5167-2 and data sheets: discharge coefficients, 5 %"),

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated
 
-from kemba.effects.base import At, Contribution, Effect, Signal
+from kemba.effects.base import AirEffect, At, Contribution, Signal
 from kemba.quantity import Param, Quantity
 
 
-class HoseLag(Effect):
+class HoseLag(AirEffect):
     """The hose between valve and chamber: every use of u sees it filtered.
 
     T = 0.1 ms, the smallest allowed, is as good as no hose.
     """
 
-    kind: Literal["hose_lag"] = "hose_lag"
     T: Annotated[float, Param("s", 0.004, lower=1e-4, doc="time constant")] = 1e-4
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = "T du_f/dt = u - u_f, u -> u_f wherever u is read"
-    source: ClassVar[str] = "line dynamics of pneumatic tubing, lumped to first order"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    off: ClassVar[dict[str, float]] = {"T": 1e-4}
+    equation = "T du_f/dt = u - u_f, u -> u_f wherever u is read"
+    source = "line dynamics of pneumatic tubing, lumped to first order"
 
     def states(self) -> dict[str, Quantity]:
         return {
@@ -41,20 +37,16 @@ class HoseLag(Effect):
         )
 
 
-class CrossLeak(Effect):
+class CrossLeak(AirEffect):
     """Air creeps past the piston's seal from the fuller chamber into the other.
 
     p is the pressure difference extend - retract.
     """
 
-    kind: Literal["cross_leak"] = "cross_leak"
     k: Annotated[float, Param("s-1", 3.0, lower=0.0, doc="pressure rate per difference")] = 0.0
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = "p = F_e/A_e - F_r/A_r; dF_e/dt -= k p A_e, dF_r/dt += k p A_r"
-    source: ClassVar[str] = "leak past a worn piston seal; areas from bore and rod"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    off: ClassVar[dict[str, float]] = {"k": 0.0}
+    equation = "p = F_e/A_e - F_r/A_r; dF_e/dt -= k p A_e, dF_r/dt += k p A_r"
+    source = "leak past a worn piston seal; areas from bore and rod"
 
     def evaluate(self, at: At) -> Contribution:
         A_e, A_r = at.cylinder.area_extend, at.cylinder.area_retract
@@ -62,17 +54,13 @@ class CrossLeak(Effect):
         return Contribution(add_rate={"F_e": -self.k * p * A_e, "F_r": self.k * p * A_r})
 
 
-class BothModeLoss(Effect):
+class BothModeLoss(AirEffect):
     """Force that is missing (F < 0: in excess) while both valves are on."""
 
-    kind: Literal["both_mode_loss"] = "both_mode_loss"
     F: Annotated[float, Param("N", 15.0, doc="force lost with both valves on")] = 0.0
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = "-F u_e u_r"
-    source: ClassVar[str] = "paper Table II: 50 N with both valves on, where eq. 7 gives 64 N"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    off: ClassVar[dict[str, float]] = {"F": 0.0}
+    equation = "-F u_e u_r"
+    source = "paper Table II: 50 N with both valves on, where eq. 7 gives 64 N"
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"piston": -self.F * at.u_e * at.u_r})

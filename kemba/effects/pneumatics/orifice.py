@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal
-from kemba.effects.pneumatics.constants import ATMOSPHERE, GAS, KAPPA, TEMPERATURE
-from kemba.effects.pneumatics.flow import CHOKED, mass_flow, phi
+from kemba.effects.pneumatics.flow import (
+    ATMOSPHERE,
+    CHOKED,
+    GAS,
+    KAPPA,
+    TEMPERATURE,
+    mass_flow,
+    phi,
+)
 from kemba.effects.pneumatics.gas import Air
 from kemba.effects.pneumatics.tables import at_supply, beyond, filled
 from kemba.quantity import Param, Quantity, Tolerance
@@ -31,7 +38,6 @@ class OrificeChamber(Effect):
     cylinder's tubes; its areas are A_e and A_r. The flow is eq. 2 and 3.
     """
 
-    kind: Literal["orifice_chamber"] = "orifice_chamber"
     a_fill: Area = 4.63e-6
     a_vent: Area = 3.99e-6
     V_e: Volume = None
@@ -40,14 +46,14 @@ class OrificeChamber(Effect):
     pressures: tuple[Pascal, ...] = (0.6e6, 0.7e6, 0.8e6)
     gauge: tuple[Pascal, ...] = (0.572e6, 0.634e6, 0.696e6)
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = (
+    family = "air"
+    equation = (
         "dP/dt = n (R T mdot - P dV/dt)/V, mdot = u a_fill phi(P_s, P) - (1-u) a_vent phi(P, P_atm)"
         "; effort A_e (P_e - P_atm) - A_r (P_r - P_atm)"
     )
-    source: ClassVar[str] = "paper eq. 1-3 (its ref. 9), fitted to Tables I, II"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    reads: ClassVar[tuple[str, ...]] = ("supply_gain", "droop", "rise_gain")
+    source = "paper eq. 1-3 (its ref. 9), fitted to Tables I, II"
+    ports = ("piston",)
+    reads = ("supply_gain", "droop", "rise_gain")
     publishes: ClassVar[tuple[str, ...]] = (
         *("F_e", "F_r", "F_static_e", "F_static_r", "tau_e", "tau_r"),
         *("draw_e", "draw_r", "full"),

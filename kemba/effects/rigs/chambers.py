@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.mechanics.laws import dahl_rate
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.quantity import Param, Quantity, Tolerance
 
 SIDES = {"extend": "P_e", "retract": "P_r"}
@@ -20,18 +20,17 @@ class MeasuredChambers(Effect):
     `travel`, with z the stretch (1 when sliding, Dahl's law).
     """
 
-    kind: Literal["measured_chambers"] = "measured_chambers"
     chambers: tuple[Literal["extend", "retract"], ...] = ("extend", "retract")
     gain: float = 1.0
     travel: Annotated[float, Param("m", 1e-4, lower=1e-7, doc="travel until seals slide")] = 2.5e-4
 
-    family: ClassVar[str] = "air"
-    equation: ClassVar[str] = (
+    family = "air"
+    equation = (
         "A_e (P_e - P_atm) - A_r (P_r - P_atm); travel dz/dt = v - abs(v) z, z for tanh(v/0.01)"
     )
-    source: ClassVar[str] = "pressure times area; P. R. Dahl, A solid friction model, 1968"
-    ports: ClassVar[tuple[str, ...]] = ("piston",)
-    publishes: ClassVar[tuple[str, ...]] = ("F_e", "F_r", "sense")
+    source = "pressure times area; P. R. Dahl, A solid friction model, 1968"
+    ports = ("piston",)
+    publishes = ("F_e", "F_r", "sense")
     nominal: ClassVar[dict[str, Tolerance]] = {
         "gain": Tolerance(0.003, source="derived: bores of ISO 15552 are H11, 25 mm +0.13 mm")
     }

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 import casadi as ca
 
-from kemba.effects.base import At, Contribution
+from kemba.effects.base import At, AxisEffect, Contribution
 from kemba.effects.mechanics.laws import coulomb, dahl_rate, fading, one_way, viscous
-from kemba.effects.rigs.on_axis import AxisEffect
 from kemba.quantity import Param, Quantity
 
 SURVEY = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994)"
@@ -17,13 +16,11 @@ SURVEY = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (19
 class AxisFriction(AxisEffect):
     """Coulomb friction of bearings, screw and guides."""
 
-    kind: Literal["axis_friction"] = "axis_friction"
     F_c: Annotated[float, Param("N", 10.0, lower=0.0, doc="Coulomb force", rotary="N.m")] = 0.0
 
-    equation: ClassVar[str] = "-F_c tanh(v/sign_speed)"
-    source: ClassVar[str] = SURVEY
-    off: ClassVar[dict[str, float]] = {"F_c": 0.0}
-    dissipative: ClassVar[bool] = True
+    equation = "-F_c tanh(v/sign_speed)"
+    source = SURVEY
+    dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": coulomb(self.F_c, at.axis.v, at.sign_speed)})
@@ -32,15 +29,13 @@ class AxisFriction(AxisEffect):
 class AxisDamping(AxisEffect):
     """Viscous friction: grease, and currents that the motion induces."""
 
-    kind: Literal["axis_damping"] = "axis_damping"
     F_v: Annotated[
         float, Param("N.s.m-1", 50.0, lower=0.0, doc="damping", rotary="N.m.s.rad-1")
     ] = 0.0
 
-    equation: ClassVar[str] = "-F_v v"
-    source: ClassVar[str] = SURVEY
-    off: ClassVar[dict[str, float]] = {"F_v": 0.0}
-    dissipative: ClassVar[bool] = True
+    equation = "-F_v v"
+    source = SURVEY
+    dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": viscous(self.F_v, at.axis.v)})
@@ -49,16 +44,12 @@ class AxisDamping(AxisEffect):
 class AxisDirection(AxisEffect):
     """Viscous friction that differs by direction: by d more forward, by d less back."""
 
-    kind: Literal["axis_direction"] = "axis_direction"
     d: Annotated[float, Param("N.s.m-1", 20.0, doc="half the difference", rotary="N.m.s.rad-1")] = (
         0.0
     )
 
-    equation: ClassVar[str] = "-d abs(v)"
-    source: ClassVar[str] = (
-        "A. Janot, M. Gautier, M. Brunot, EMPS benchmark, 2019 (asymmetric friction)"
-    )
-    off: ClassVar[dict[str, float]] = {"d": 0.0}
+    equation = "-d abs(v)"
+    source = "A. Janot, M. Gautier, M. Brunot, EMPS benchmark, 2019 (asymmetric friction)"
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": -self.d * ca.fabs(at.axis.v)})
@@ -70,12 +61,10 @@ class AxisOneWay(AxisEffect):
     While the axis moves it looks like `axis_offset`; only at rest do the two differ.
     """
 
-    kind: Literal["axis_one_way"] = "axis_one_way"
     F_d: Annotated[float, Param("N", 5.0, doc="half the difference", rotary="N.m")] = 0.0
 
-    equation: ClassVar[str] = "-F_d tanh(v/sign_speed)^2"
-    source: ClassVar[str] = SURVEY
-    off: ClassVar[dict[str, float]] = {"F_d": 0.0}
+    equation = "-F_d tanh(v/sign_speed)^2"
+    source = SURVEY
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": one_way(self.F_d, at.axis.v, at.sign_speed)})
@@ -84,7 +73,6 @@ class AxisOneWay(AxisEffect):
 class AxisStribeck(AxisEffect):
     """Extra friction near standstill that fades as lubricant is drawn in."""
 
-    kind: Literal["axis_stribeck"] = "axis_stribeck"
     F_s: Annotated[
         float, Param("N", 10.0, lower=0.0, doc="extra force near standstill", rotary="N.m")
     ] = 0.0
@@ -92,10 +80,9 @@ class AxisStribeck(AxisEffect):
         float, Param("m.s-1", 0.02, lower=1e-5, doc="rate at which it fades", rotary="rad.s-1")
     ] = 0.02
 
-    equation: ClassVar[str] = "-F_s exp(-(v/v_b)^2) tanh(v/sign_speed)"
-    source: ClassVar[str] = SURVEY
-    off: ClassVar[dict[str, float]] = {"F_s": 0.0}
-    dissipative: ClassVar[bool] = True
+    equation = "-F_s exp(-(v/v_b)^2) tanh(v/sign_speed)"
+    source = SURVEY
+    dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
         extra = self.F_s * fading(at.axis.v, self.v_b)
@@ -105,15 +92,11 @@ class AxisStribeck(AxisEffect):
 class GearFriction(AxisEffect):
     """Friction of gear teeth, which the force of inertia and load presses together."""
 
-    kind: Literal["gear_friction"] = "gear_friction"
     mu: Annotated[float, Param("1", 0.1, lower=0.0, upper=1.0, doc="share of the force")] = 0.0
 
-    equation: ClassVar[str] = "-mu abs(J a + load) tanh(v/sign_speed)"
-    source: ClassVar[str] = (
-        "load-dependent friction of gears: M. Gautier, A. Jubien, A. Janot, ICRA 2012"
-    )
-    off: ClassVar[dict[str, float]] = {"mu": 0.0}
-    dissipative: ClassVar[bool] = True
+    equation = "-mu abs(J a + load) tanh(v/sign_speed)"
+    source = "load-dependent friction of gears: M. Gautier, A. Jubien, A. Janot, ICRA 2012"
+    dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
         pressed = self.mu * ca.fabs(at.carried)
@@ -126,15 +109,13 @@ class Presliding(AxisEffect):
     With a short travel it is Coulomb friction.
     """
 
-    kind: Literal["presliding"] = "presliding"
     F_p: Annotated[float, Param("N", 10.0, lower=0.0, doc="force when sliding", rotary="N.m")] = 0.0
     travel: Annotated[
         float, Param("m", 1e-4, lower=1e-7, doc="travel until it slides", rotary="rad")
     ] = 2e-4
 
-    equation: ClassVar[str] = "-F_p z, travel dz/dt = v - abs(v) z"
-    source: ClassVar[str] = "P. R. Dahl, A solid friction model, Aerospace Corporation, 1968"
-    off: ClassVar[dict[str, float]] = {"F_p": 0.0}
+    equation = "-F_p z, travel dz/dt = v - abs(v) z"
+    source = "P. R. Dahl, A solid friction model, Aerospace Corporation, 1968"
     mirror: ClassVar[dict[str, str]] = {"z": "-z"}
 
     def states(self) -> dict[str, Quantity]:

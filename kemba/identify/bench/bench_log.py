@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses

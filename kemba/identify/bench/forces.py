@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.effects.pneumatics.switching import changes
 from kemba.identify.bench.bench_log import BenchLog, BenchLogSettings
 from kemba.identify.bench.motion import SmoothedMotion

@@ -130,9 +130,8 @@ def _weigh_in(
     good = np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
     sigma = max(difference_sigma(v[good]), FINEST_SPEED)
-    width = WIDTH
-    smoothed = _mean(measured, width)
-    sd = np.full(len(grid), sigma / np.sqrt(2 * width + 1))
+    smoothed = _mean(measured, WIDTH)
+    sd = np.full(len(grid), sigma / np.sqrt(2 * WIDTH + 1))
     gap = np.median(np.abs(smoothed - rate) / np.hypot(sd, spread))
     if gap > CONTRADICTS:
         return rate, spread
@@ -187,13 +186,12 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
 
 def _quiet(time: Array, x: Array) -> _Quiet | None:
     """A log without its motion; None where it is too short."""
-    width = QUIET_WIDTH
     grid, values, step = _even_grid(time, x)
-    if len(grid) < 2 * width + 1:
+    if len(grid) < 2 * QUIET_WIDTH + 1:
         return None
-    smooth, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
-    rest = maximum_filter1d(np.abs(v), 2 * width + 1) < REST
-    rest[:width] = rest[-width:] = False
+    smooth, v = (local_fit(values, QUIET_WIDTH, step, 3, k) for k in (0, 1))
+    rest = maximum_filter1d(np.abs(v), 2 * QUIET_WIDTH + 1) < REST
+    rest[:QUIET_WIDTH] = rest[-QUIET_WIDTH:] = False
     sigma = max(difference_sigma(x[np.isfinite(x)]), FINEST)
     return _Quiet((values - smooth) / sigma, rest, step)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import delayed
 from kemba.effects.series import Series
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog

@@ -30,7 +30,6 @@ from kemba.identify.problem.candidates import effect_candidates, sensor_candidat
 from kemba.identify.problem.noise import ColouredProblem, colours, whiten
 from kemba.identify.problem.types import (
     Array,
-    Candidate,
     Changes,
     ForceChannel,
     Leftover,
@@ -71,7 +70,9 @@ class BenchProblem(ColouredProblem):
         if sensors:
             self.candidates |= sensor_candidates(_sensor_sigmas(logs), model)
         row = max(log.seen_within for log in logs)
-        hidden = {n: c for n, c in self.candidates.items() if _within(c, row)}
+        hidden = {
+            n: c for n, c in self.candidates.items() if c.lead.unit == "s" and c.lead.size < row
+        }
         self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
         predictor = BenchPredictor(model, self.candidates)
         states = predictor.at({}).state_names
@@ -132,14 +133,13 @@ class BenchProblem(ColouredProblem):
         return columns
 
     def rows(self) -> Rows:
-        rest = REST
         parts: list[tuple[np.ndarray, ...]] = []
         for i in range(len(self.logs)):
             log = self.logs[i]
             for c in log.measured:
                 keep = log.keep[c]
                 n, k = int(keep.sum()), self.channels.index(c)
-                label = np.where(np.abs(log.motion.v[keep]) < rest, "rest", "moving")
+                label = np.where(np.abs(log.motion.v[keep]) < REST, "rest", "moving")
                 one = (np.full(n, i), np.full(n, k), log.motion.time[keep], label, log.mode[keep])
                 parts.append((*one, np.full(n, log.sigma[c])))
         run, channel, time, phase, mode, sigma = (
@@ -245,11 +245,6 @@ def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     return BenchProblem(
         [clocks.without_drift(run, *drift) for run in runs(logs)], model, drift=drift
     )
-
-
-def _within(candidate: Candidate, row: float) -> bool:
-    """Whether an effect is a time that does not show in logs with a row every `row` [s]."""
-    return candidate.lead.unit == "s" and candidate.lead.size < row
 
 
 def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:

@@ -105,12 +105,11 @@ class RigModel:
         n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
         inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
-        chunk = CHUNK
-        inputs = np.pad(inputs, ((0, 0), (0, -n % chunk)))  # steps of no length at the end
-        fixed = np.repeat(p[:, None], chunk, axis=1)
-        step, states = self._mapped("step", chunk), [s0[:, None]]
-        for i in range(0, inputs.shape[1], chunk):
-            states.append(step(states[-1][:, -1], inputs[:, i : i + chunk], fixed))
+        inputs = np.pad(inputs, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
+        fixed = np.repeat(p[:, None], CHUNK, axis=1)
+        step, states = self._mapped("step", CHUNK), [s0[:, None]]
+        for i in range(0, inputs.shape[1], CHUNK):
+            states.append(step(states[-1][:, -1], inputs[:, i : i + CHUNK], fixed))
         return np.concatenate(states, axis=1)[:, : n + 1]
 
     def _mapped(self, kind: str, n: int) -> _Call:
@@ -172,7 +171,6 @@ def share(intervals: Array, times: Array) -> Array:
     knots = np.concatenate([[times[0] - 1.5], flat, [times[-1] + 1.5]])
     slope = np.arange(len(knots) - 1) % 2
     on_time = np.concatenate([[0.0], np.cumsum(slope * np.diff(knots))])
-    blur = BLUR
-    later = np.interp(times + blur, knots, on_time)
-    earlier = np.interp(times - blur, knots, on_time)
-    return np.asarray(np.clip((later - earlier) / (2 * blur), 0.0, 1.0))
+    later = np.interp(times + BLUR, knots, on_time)
+    earlier = np.interp(times - BLUR, knots, on_time)
+    return np.asarray(np.clip((later - earlier) / (2 * BLUR), 0.0, 1.0))

@@ -140,9 +140,8 @@ def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tu
     if found.q_value < BinSettings.false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)
-    fair = FAIR
     bins = condition_bins(rows, region, window.first, sums)
-    clean = not any(c.significant and c.ratio > fair for c in bins)
+    clean = not any(c.significant and c.ratio > FAIR for c in bins)
     return rms(sums), clean and rms(sums) <= BinSettings.tolerated
 
 

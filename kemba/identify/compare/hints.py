@@ -112,8 +112,7 @@ class Response:
 
     @property
     def certain(self) -> bool:
-        certain = CERTAIN
-        return bool(np.abs(self.z[self.peak]) > -ndtri(certain / (2 * self.tests)))
+        return bool(np.abs(self.z[self.peak]) > -ndtri(CERTAIN / (2 * self.tests)))
 
     @property
     def hint(self) -> Hint:
@@ -151,12 +150,11 @@ def _strongest(
         if name in changes:
             own = rows.run == i
             rise[own] = risen(*changes[name], rows.time[own])
-    dependent = DEPENDENT
     best, tests = None, commands * len(rows.channels)
     for k, channel in enumerate(rows.channels):
         own = rows.channel == k
         power = np.sum(rise[own] ** 2, axis=0)
-        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / dependent
+        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
         z = np.where(power > 1e-9 * np.max(power, initial=1e-12), z, 0.0)
         this = Response(channel, name, middle(lags()), z, tests)
         if best is None or np.max(np.abs(z)) > np.max(np.abs(best.z)):

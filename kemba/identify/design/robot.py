@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from kemba.config import dump_yaml
-from kemba.effects.mechanics.motor import Motor
+from kemba.effects.mechanics.hip import Motor
 from kemba.errors import KembaError
 from kemba.identify.answer import read_answer
 from kemba.identify.design.separation import (

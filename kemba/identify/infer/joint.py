@@ -290,7 +290,9 @@ def _as_written(
         if candidate is None or name not in theta or name in problem.nuisance:
             told.append(name)
             nominal: Any = 1.0
-            if hasattr(problem, "model") and _is_factor(problem, name):
+            if hasattr(problem, "model") and (
+                name not in problem.own_figures and not is_fault(name)
+            ):
                 nominal = _nominal(problem.model, effect, parameter)
             if isinstance(nominal, tuple):
                 figures[name] = tuple(float(value[i]) * x for x in nominal)
@@ -330,8 +332,3 @@ def _nominal(model: Model, effect: str, figure: str) -> Any:
     name, _, entry = figure.partition("[")
     value = model.effect(effect).value(name)
     return float(value[int(entry[:-1])]) if entry else value
-
-
-def _is_factor(problem: Problem, name: str) -> bool:
-    """Whether a nuisance parameter is the factor of a figure, and not its value."""
-    return name not in problem.own_figures and not is_fault(name)

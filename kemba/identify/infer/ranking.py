@@ -78,9 +78,8 @@ def _likeliest_with(search: Search, effect: str) -> Hypothesis:
 
 def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
     """Where nothing was found significant, nothing is the likeliest."""
-    most = DOUBTED
     rest = sum(p for h, p in probability.items() if h)
-    scale = min(1.0, most / rest) if rest > 0 else 1.0
+    scale = min(1.0, DOUBTED / rest) if rest > 0 else 1.0
     return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
 
 

@@ -133,11 +133,10 @@ def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> A
 
 def _folds(run: Labels) -> Labels:
     """Which fold each row (n,) belongs to: runs are cut into blocks of time, dealt out in turn."""
-    folds = FOLDS
     labels = np.zeros(len(run), dtype=int)
     for i in np.unique(run):
         own = np.flatnonzero(run == i)
-        labels[own] = np.arange(len(own)) * 2 * folds // len(own) % folds
+        labels[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
     return labels
 
 

@@ -58,12 +58,11 @@ def thinned(log: Trajectory) -> Trajectory:
 def cut(log: Trajectory, share: float) -> list[Trajectory]:
     """Pieces spread evenly over the log that make up `share` of it."""
     span = float(log.time[-1] - log.time[0])
-    piece = PIECE
-    wanted = max(1, int(span * share / piece))
-    if span <= 2 * piece:
+    wanted = max(1, int(span * share / PIECE))
+    if span <= 2 * PIECE:
         return [log]
-    starts = log.time[0] + (span - piece) * (np.arange(wanted) + 0.5) / wanted
-    return [part(log, start, start + piece) for start in starts]
+    starts = log.time[0] + (span - PIECE) * (np.arange(wanted) + 0.5) / wanted
+    return [part(log, start, start + PIECE) for start in starts]
 
 
 def part(log: Trajectory, start: float, end: float) -> Trajectory:

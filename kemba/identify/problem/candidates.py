@@ -88,15 +88,6 @@ def by_default(name: str) -> Effect:
     return BY_KIND[kind].model_validate({"kind": kind, **where})
 
 
-def _switched_on(candidates: Mapping[str, Candidate], theta: Theta) -> tuple[str, ...]:
-    """Names of the candidates, sensors left out, that theta switches on."""
-    return tuple(
-        name
-        for name, c in sorted(candidates.items())
-        if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
-    )
-
-
 class CompiledModels(Generic[T]):
     """A model compiled with the effects that theta switches on, each set of effects once.
 
@@ -116,7 +107,11 @@ class CompiledModels(Generic[T]):
 
     def at(self, theta: Theta) -> T:
         """The model with the effects on its list that theta switches on."""
-        active = _switched_on(self.candidates, theta)
+        active = tuple(
+            name
+            for name, c in sorted(self.candidates.items())
+            if not c.sensor and theta.get(c.key, c.lead.off) != c.lead.off
+        )
         if active not in self._known:
             present = {e.name for e in self.model.effects}
             extra = (e for e in map(by_default, active) if e.name not in present)

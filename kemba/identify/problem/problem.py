@@ -44,8 +44,7 @@ def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> A
     """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
     `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
     through its cylinder's end leaves no volume to the air."""
-    absurd = ABSURD
-    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < absurd)]
+    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < ABSURD)]
     if not known:
         return np.zeros_like(base)
     return np.asarray(np.mean([(there[i] - base) / steps[i] for i in known], axis=0))

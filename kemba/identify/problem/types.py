@@ -118,8 +118,7 @@ class OperatingPoint:
     def regions(self) -> Texts:
         """Label (n,) of each row: `in` near the retracted end of the stroke, `mid`, `out` near the
         extended end; an empty text without a piston."""
-        end = END
-        ends = np.array([end, self.stroke - end])
+        ends = np.array([END, self.stroke - END])
         index = np.searchsorted(ends, self.x, side="right")
         return np.array([*REGIONS, ""], dtype=object)[np.where(np.isfinite(self.x), index, -1)]
 

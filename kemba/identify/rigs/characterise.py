@@ -88,7 +88,6 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
     without a value start at their usual size. Raises KembaError where logs cannot tell them apart.
     """
-    loose = LOOSE
     started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
     names = [
         name
@@ -101,7 +100,7 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]
-    problem: Problem = make(logs, started, dict.fromkeys(names, loose))
+    problem: Problem = make(logs, started, dict.fromkeys(names, LOOSE))
     before: Problem = make(logs, model)
     values = {n: float(started.effect(n.rsplit(".", 1)[0]).value(n.rsplit(".", 1)[1]))
               for n in names}  # fmt: skip

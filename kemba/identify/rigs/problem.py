@@ -48,11 +48,10 @@ class RigProblem(ColouredProblem):
         self.predictor = predictor
         predictor.candidates = self.candidates
         self.nuisance = predictor.figures | predictor.sensors.nuisance
-        zero = WEATHER
         for name in model.mechanism.logged:
             key = f"sensor_bias:{name}"
             if name.endswith("/P") and key not in predictor.sensors.listed:
-                self.nuisance[f"{key}.b"] = (0.0, zero)
+                self.nuisance[f"{key}.b"] = (0.0, WEATHER)
                 self.candidates.pop(key, None)
         self._sigma = [np.sqrt(predictor.variance(log, self.usual)) for log in self.logs]
 

@@ -139,8 +139,7 @@ def filtered(
 
 
 def _smooth(values: Array, width: float) -> Array:
-    reach = REACH
-    return np.asarray(gaussian_filter1d(values, width, truncate=reach, mode="nearest"))
+    return np.asarray(gaussian_filter1d(values, width, truncate=REACH, mode="nearest"))
 
 
 def _rate_noise(sigma: float, step: float, width: int) -> float:

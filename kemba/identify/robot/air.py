@@ -133,13 +133,12 @@ class Forces:
         for (None: all)."""
         key = delays.tobytes() + p[self.physics.moves].tobytes() + bytes([among is None])
         if key not in self._states:
-            kept = KEPT
             given = self._inputs.get(delays.tobytes())
             if given is None:
                 given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-                _keep(self._inputs, delays.tobytes(), given, kept)
+                _keep(self._inputs, delays.tobytes(), given, KEPT)
             states, inputs = air_states(self.physics, self.batch, given, p, among)
-            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)), kept)
+            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)), KEPT)
         return self._states[key]
 
     def _force(self, p: Array, delays: Array) -> Array:

@@ -82,8 +82,7 @@ def innovations(system: System, gain: FilterGains, y: Array | None, g: Array | N
 
 def at_once(count: int) -> Iterator[slice]:
     """The parts of so many columns that pass the filter at once."""
-    size = COLUMNS
-    return (slice(i, i + size) for i in range(0, count, size))
+    return (slice(i, i + COLUMNS) for i in range(0, count, COLUMNS))
 
 
 def predicted(

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from kemba.effects.mechanics.friction import V_COULOMB
+from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.problem.missing_force import dahl, end_terms, spans
 from kemba.identify.problem.types import Array, Flags, ForceChannel, MissingForce, Theta

@@ -31,18 +31,13 @@ from kemba.identify.robot.filter import FilterGains, System, innovations
 Noise = Sequence[ChannelNoise]  # one per channel; empty: all are white
 
 
-def _is_white(noise: Noise) -> bool:
-    """Whether no channel has a lag, nor another sigma than the stated one."""
-    return all(channel == ChannelNoise() for channel in noise)
-
-
 def coloured(system: System, noise: Noise, sigma: Array, h: Array) -> System:
     """The filter's system with every lag of `noise` as one more state.
 
     `system`: white, with the channels as its first rows; `sigma` (L, m): stated noise of each run's
     channels; `h` (n, L) [s]: length of each step.
     """
-    if _is_white(noise):
+    if all(channel == ChannelNoise() for channel in noise):
         return system
     lags = [(i, s, memory) for i, c in enumerate(noise) for s, memory in c.lags]
     n, runs, m, d = system.H.shape
@@ -96,11 +91,10 @@ def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
     rng = np.random.default_rng(seed)
     y = simulated(system, DRAWS, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
-    width = WIDTH
-    padded = np.pad(power, ((width // 2, width // 2), (0, 0), (0, 0)), mode="edge")
+    padded = np.pad(power, ((WIDTH // 2, WIDTH // 2), (0, 0), (0, 0)), mode="edge")
     total = np.cumsum(padded, axis=0)
     total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
-    return np.asarray(np.maximum((total[width:] - total[:-width]) / width, LEAST))
+    return np.asarray(np.maximum((total[WIDTH:] - total[:-WIDTH]) / WIDTH, LEAST))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from kemba.effects.pneumatics.constants import ATMOSPHERE
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.problem.types import Array, Changes, OperatingPoint, Rows, Texts
 from kemba.identify.robot.batch import ResampledLog

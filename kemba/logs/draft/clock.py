@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,19 +43,9 @@ COUNTERS = frozenset(
 
 
 @dataclass(frozen=True)
-class Stamp:
-    """The time of a log: how the map reads it, from which columns, why, and what speaks against."""
-
-    source: dict[str, Any]
-    names: tuple[str, ...]
-    from_first: bool
-    reason: str
-    question: str = ""
-
-
-@dataclass(frozen=True)
 class Clock:
-    """A way to read the time: `seconds` (n,) from its first row."""
+    """A way to read the time: how the map reads it, from which columns, `seconds` (n,) from its
+    first row, why, and what speaks against it."""
 
     score: float
     source: dict[str, Any]
@@ -63,6 +53,7 @@ class Clock:
     seconds: Array
     from_first: bool
     reason: str
+    question: str = ""
 
 
 def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
@@ -85,7 +76,7 @@ def switches(raw: Raw) -> set[str]:
     }
 
 
-def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Stamp | None:
+def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | None:
     """The best of all candidates; None where no column rises that may be a time.
 
     A question is put where another one, as good by its name, runs at another rate.
@@ -108,7 +99,7 @@ def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Stamp | Non
             f"is the time {'+'.join(best.names)}, {best.seconds[-1]:.4g} s long, or "
             f"{'+'.join(other.names)}, {other.seconds[-1]:.4g} s long?"
         )
-    return Stamp(best.source, best.names, best.from_first, reason, question)
+    return replace(best, reason=reason, question=question)
 
 
 def joint_state_labels(raw: Raw) -> dict[str, str]:

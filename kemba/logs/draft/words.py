@@ -183,7 +183,7 @@ def meaning(name: str, legs: Sequence[str]) -> Meaning:
         if group == "kind":
             first = next((kind for kind in ORDER if kind in hits), None)
             hits = {first: 1} if first else hits
-            if len(hits) > 1 and set(said) & _other() <= {"current"}:
+            if len(hits) > 1 and set(said) & set(WORDS["kind"]["other"].split()) <= {"current"}:
                 hits.pop("other", None)  # the `current position` is no electric one
         if hits:
             found[group] = set(hits)
@@ -223,10 +223,6 @@ def unknown(name: str, legs: Sequence[str]) -> int:
 def says_time(name: str) -> bool:
     """Whether a name calls a time."""
     return bool(set(words(named_unit(name)[0])) & set(TIMES.split()))
-
-
-def _other() -> set[str]:
-    return set(WORDS["kind"]["other"].split())
 
 
 def _groups(legs: Sequence[str]) -> dict[str, dict[str, str]]:

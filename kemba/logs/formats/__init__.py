@@ -24,13 +24,15 @@ READERS = {
     **MODULES, "db3": "rosbag2", "mf4": "measured", "mdf": "measured", "tdms": "measured",
     "ulg": "measured", "lvm": "lines", "sto": "lines", "mot": "lines",
 }  # fmt: skip
+SAME = {"mdf": "mf4", "mot": "sto"}  # older endings of formats
 FOLDER = "db3"  # the ending whose reader takes the folder of a rosbag2
 
 
 def reader(path: Path) -> Read:
     """The function that reads a file of this ending, or a folder."""
     ending = FOLDER if path.is_dir() else _ending(path)
-    found: Read = getattr(_module(path, READERS[ending]), f"read_{ending}")
+    module = _module(path, READERS[ending])
+    found: Read = getattr(module, f"read_{SAME.get(ending, ending)}")
     return found
 
 

@@ -85,11 +85,6 @@ def read_sto(path: Path) -> Recording:
     return Recording(dict(zip(names, table.T, strict=True)), units=units)
 
 
-def read_mot(path: Path) -> Recording:
-    """OpenSim's motion files are of the same form."""
-    return read_sto(path)
-
-
 def _lines(path: Path) -> list[str]:
     try:
         with open(path, encoding=encoding(path), newline=None) as stream:

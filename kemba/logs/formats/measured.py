@@ -23,11 +23,6 @@ def read_mf4(path: Path) -> Recording:
     return _named(path, [group for group in groups if group is not None])
 
 
-def read_mdf(path: Path) -> Recording:
-    """The same under its older ending."""
-    return read_mf4(path)
-
-
 def _mdf_group(file: Any, number: int) -> Group | None:
     columns: Raw = {}
     units: dict[str, str] = {}

@@ -14,7 +14,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.effects.mechanics.contact import Contact
+from kemba.effects.mechanics.ground import Contact
 from kemba.events import LASTS, PLANNED, read
 from kemba.model import Model
 from kemba.model.impact import felt
@@ -24,7 +24,6 @@ from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays, groups
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import rigid_constraints
-from kemba.settings import Settings, setting
 from kemba.trajectory import Array, Trajectory
 
 BETWEEN = 4  # places in every interval at which bounds are looked at
@@ -336,19 +335,8 @@ def _with_unit(value: float, unit: str) -> str:
     return f"{value:.4g} {unit}".removesuffix(" 1")
 
 
-class GripSettings(Settings):
-    """Which feet count."""
-
-    loaded: float = setting(
-        1e-3,
-        "1",
-        "least load, of the weight or its impulse in a second",
-        "convention: a thousandth",
-    )
-    slides: float = setting(
-        1e-4, "m.s-1", "speed at which a foot slides and uses all its friction by itself",
-        "convention: below what a plan's tolerance lets sticking feet do",
-    )  # fmt: skip
+LOADED = 1e-3  # least load of a foot that counts, of the weight or its impulse in a second
+SLIDES = 1e-4  # m.s-1; a foot that slides uses all its friction by itself
 
 
 def grip_of(model: Model, plan: Trajectory) -> float | None:
@@ -357,16 +345,16 @@ def grip_of(model: Model, plan: Trajectory) -> float | None:
     ground = next((e for e in model.effects if isinstance(e, Contact)), None)
     if ground is None or not ground.mu:
         return None
-    shares, settings = [], GripSettings.current()
+    shares = []
     for leg in model.mechanism.legs:
         for tangential, normal in (("Fx", "Fz"), ("impulse_x", "impulse_z")):
             names = [f"{leg}/foot/{name}" for name in (tangential, normal)]
             if not all(name in plan for name in names):
                 continue
             push, load = (plan[name] for name in names)
-            on = load > settings.loaded * model.mechanism.weight
+            on = load > LOADED * model.mechanism.weight
             if f"{leg}/foot/slip" in plan:
-                on &= plan[f"{leg}/foot/slip"] < settings.slides
+                on &= plan[f"{leg}/foot/slip"] < SLIDES
             x = plan.get(f"{leg}/foot/x", np.zeros(len(plan)))
             mu = np.broadcast_to(model.mechanism.scene.ground.friction(x, ground.mu), x.shape)
             shares += [np.abs(push[on]) / (mu[on] * load[on])]

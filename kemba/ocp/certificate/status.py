@@ -10,7 +10,6 @@ from kemba.ocp.certificate.certify import OF_WEIGHT, Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.task.task import Task
 from kemba.ocp.task.templates import rise_of_feet
-from kemba.settings import Settings, setting
 from kemba.trajectory import Trajectory
 
 # what the rows of a plan are called in the certificate's `worst`, in words
@@ -21,14 +20,7 @@ LAWS = {
     "bound": "the bound",
 }
 
-
-class Judging(Settings):
-    """When a plan that misses its tolerances is still usable."""
-
-    acceptable: float = setting(
-        100.0, "1", "times the tolerances within which a plan is usable, but not what was asked",
-        "convention: two digits short of what was asked",
-    )  # fmt: skip
+USABLE = 100.0  # times the tolerances within which a plan is usable: two digits short
 
 
 class Status(str, Enum):
@@ -61,10 +53,10 @@ def verdict(
         return Status.INTERRUPTED, what
     if certificate.within(task.tolerances):
         return Status.SOLVED, f"solved: {facts}"
-    factor, names = Judging.current().acceptable, ("complementarity", "dynamics", "bounds")
-    loose = {name: factor * getattr(task.tolerances, name) for name in names}
+    names = ("complementarity", "dynamics", "bounds")
+    loose = {name: USABLE * getattr(task.tolerances, name) for name in names}
     worst, missed = _worst(certificate), certificate.missed
-    nearly = all(m.miss <= factor * m.allowed for m in missed)
+    nearly = all(m.miss <= USABLE * m.allowed for m in missed)
     if nearly and certificate.sound(task.tolerances.model_copy(update=loose)):
         return Status.ACCEPTABLE, f"the plan misses its tolerances: {worst}; {facts}"
     if certificate.sound(task.tolerances) and (ending is None or ending.good):

@@ -11,9 +11,10 @@ import numpy as np
 
 from kemba.cache import Recent
 from kemba.ocp.functions.code import Code, code_of
-from kemba.ocp.functions.settings import Functions
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
+
+PROBLEMS = 8  # programs kept for equal ones of the process: twice those of a continued plan
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ def block_problem(
 
     parts = ((b.code, b.columns.shape, b.columns.tobytes()) for b in placed)
     key = (size, p.numel(), *parts)
-    return _kept.get(key, make, Functions.current().problems) if shared else make()
+    return _kept.get(key, make, PROBLEMS) if shared else make()
 
 
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:

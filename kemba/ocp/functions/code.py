@@ -17,7 +17,18 @@ import numpy as np
 
 from kemba.cache import Recent
 from kemba.instructions import replay
-from kemba.ocp.functions.settings import Functions
+from kemba.settings import Settings, setting
+
+FEW = 8  # points at which evaluating one by one is as fast as all at once
+
+
+class Functions(Settings):
+    """How the functions for IPOPT are made."""
+
+    kept: int = setting(
+        400, "1", "blocks whose functions are kept for the next program of the process",
+        "convention: twice the blocks of all programs of a jump",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +150,7 @@ def parameterised(
 def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.Function:
     """f of SX at `points` at once: its inputs (n, points), except the `shared` ones (n,), which
     are the same at all; dense outputs (m, points). Equal to f at every point to the last bit."""
-    if points < Functions.current().few or f.class_name() != "SXFunction":
+    if points < FEW or f.class_name() != "SXFunction":
         return f.map(f.name(), "serial", points, list(shared), [])
     widths = [1 if i in shared else points for i in range(f.n_in())]
     inputs = [ca.MX.sym(f.name_in(i), f.numel_in(i), w) for i, w in enumerate(widths)]

@@ -11,7 +11,20 @@ from functools import cached_property
 import casadi as ca
 
 from kemba.ocp.functions.problem import NlpFunctions
-from kemba.ocp.functions.settings import Newton
+from kemba.settings import Settings, setting
+
+
+class Newton(Settings):
+    """Newton steps, starts and the stagnation test."""
+
+    regularisation: float = setting(
+        2e-3, "1", "multiple of the identity in the Hessian of whole robots, per scaled variable; "
+        "IPOPT's own additions are 1e-4 to 1", "tuned: benchmarks/variants.py", decides=True,
+    )  # fmt: skip
+    progress: float = setting(
+        0.8, "1", "part of the violation that may be left for a solve to count as progressing",
+        "convention: a fall by a fifth", decides=True,
+    )  # fmt: skip
 
 
 class Proximal:

@@ -8,9 +8,25 @@ from kemba.config import Document
 from kemba.model import Model
 from kemba.ocp.infeasibility.diagnostic import Diagnostic, key, number, place, relax
 from kemba.ocp.infeasibility.flight import AskedFlight, air_work, hip_power, leg_swing
-from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.settings import Settings, setting
+
+HEAVY = 0.2  # payload of all that is lifted, from which it is named as a cause
+FORWARD = 0.01  # m, way forward that needs friction of the ground: less is within the legs' swing
+
+
+class Checks(Settings):
+    """What refuses a task before solving, and what is given as a hint."""
+
+    strokes: int = setting(
+        3, "1", "pushes in one motion; a task that needs more energy is refused",
+        "convention: no planned motion has more", decides=True,
+    )  # fmt: skip
+    longest_step: float = setting(
+        0.05, "s", "longest step with which a valve can be timed within a push",
+        "convention: a push is only a few of these long", decides=True,
+    )  # fmt: skip
 
 
 def budget_diagnostics(
@@ -66,7 +82,7 @@ def _energy(
         return
     longest = task.duration * (1 + task.step_variation) * (flight.requirement.at or 1.0)
     causes = [f"{off} keeps the pistons without air"] if off else []
-    if task.payload > Checks.current().heavy * flight.mass:
+    if task.payload > HEAVY * flight.mass:
         causes.append(f"{key('payload', document)} adds {number(task.payload, 'kg')}")
     lifted = f"{asked}: lifting {flight.mass:.1f} kg to {number(flight.height, 'm')}"
     most = flight.z0 + air / (flight.mass * flight.fall)
@@ -100,7 +116,7 @@ def _grip(
     floors = [e for e in model.effects if e.family == "ground" and "mu" in e.parameters()]
     if not floors or all(float(e.value("mu")) > 0 for e in floors):
         return
-    if way < Checks.current().forward:
+    if way < FORWARD:
         return
     where = place(document, last[0].location)
     yield Diagnostic(

@@ -11,7 +11,7 @@ from itertools import groupby
 from kemba.config import Document
 from kemba.config.document import Location
 from kemba.model import Model
-from kemba.ocp.infeasibility.budget import budget_diagnostics
+from kemba.ocp.infeasibility.budget import Checks, budget_diagnostics
 from kemba.ocp.infeasibility.diagnostic import (
     Diagnostic,
     key,
@@ -23,7 +23,6 @@ from kemba.ocp.infeasibility.diagnostic import (
 )
 from kemba.ocp.infeasibility.flight import AskedFlight, flight_of
 from kemba.ocp.infeasibility.pose import Gap, Poses
-from kemba.ocp.infeasibility.settings import Checks
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.quantity import Quantity

@@ -11,7 +11,6 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.functions.blocks import RowBlock
-from kemba.ocp.infeasibility.settings import ElasticSolve
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.guess import automatic_guess
@@ -25,9 +24,32 @@ from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import StageRows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
+from kemba.settings import Settings, setting
 
 # What may be violated: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end", "clearance"))
+
+BUDGET = 30.0  # s; a user waits no longer for an explanation
+ITERATIONS = 500  # of one solve: bounded, since it only explains
+CHEAP = 0.01  # factor on the task's costs: far below the price of slack
+ROOM = 0.1  # scaled slack of the start guess: off the bounds, in the range of answers
+
+
+class ElasticSolve(Settings):
+    """The solve in which requirements may be violated."""
+
+    nodes: int = setting(
+        40, "1", "of its grid at most; a coarse one is enough to say what is too much",
+        "convention: bounded, since it only explains", decides=True,
+    )  # fmt: skip
+    price: float = setting(
+        100.0, "1", "of one unit of scaled slack, beside a cost of 0.01 to 10",
+        "derived: above every cost of the task, so that no violation pays", decides=True,
+    )  # fmt: skip
+    short: float = setting(
+        0.05, "1", "scaled slack (5 mm, 0.6 deg) from which a requirement is out of reach",
+        "convention: above the grid's own error of some millimetres", decides=True,
+    )  # fmt: skip
 
 
 class Elastic(Transcription):
@@ -48,8 +70,7 @@ class Elastic(Transcription):
     ) -> None:
         self.soft = soft
         self.slack: list[tuple[Requirement, int, float]] = []  # requirement, first column, scale
-        factor = ElasticSolve.current().cheap
-        cheap = scaled(task.cost, factor)
+        cheap = scaled(task.cost, CHEAP)
         super().__init__(
             model, task.model_copy(update={"cost": cheap}), requirements, reduction, nodes
         )
@@ -104,7 +125,7 @@ class Elastic(Transcription):
         """
         wide = np.zeros(self.shape)
         wide[:, : self.layout.size] = Y
-        wide[0, self.layout.size :] = ElasticSolve.current().room
+        wide[0, self.layout.size :] = ROOM
         return wide
 
     def given(self, Y: np.ndarray) -> list[tuple[Requirement, float, float]]:
@@ -144,7 +165,7 @@ def elastic(
 
     Raises Stopped when the user stopped it.
     """
-    deadline = min(session.control.deadline, time.monotonic() + ElasticSolve.current().budget)
+    deadline = min(session.control.deadline, time.monotonic() + BUDGET)
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}
     nodes = min(task.nodes, ElasticSolve.current().nodes)
@@ -177,7 +198,7 @@ def _tiers(task: Task) -> Iterator[tuple[Task, Sequence[str]]]:
 
 def _solve(program: Elastic, session: Session) -> Outcome | None:
     """The usual schedule; the last step that converged counts."""
-    options = {**program.task.solver.options, "max_iter": ElasticSolve.current().iterations}
+    options = {**program.task.solver.options, "max_iter": ITERATIONS}
     schedule = session.schedule(program, options)
     converged: list[Iterate] = []
     try:

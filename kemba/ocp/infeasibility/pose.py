@@ -11,21 +11,35 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.infeasibility.settings import PoseSearch
 from kemba.ocp.task.requirement import Requirement, quantity_expression
+from kemba.settings import Settings, setting
+
+STILL = 1e-6  # weight of squared rates, so that they are determined
+SPREAD = 3.0  # standard deviation of further starts, times the scale of a coordinate
+
+
+class PoseSearch(Settings):
+    """How poses are sought in which requirements hold together."""
+
+    tries: int = setting(
+        4, "1", "starts", "convention: the standing pose and three others", decides=True
+    )
+    met: float = setting(
+        1e-5, "SI", "slack below which a requirement counts as met",
+        "derived: 10 times the certificate's tolerance", decides=True,
+    )  # fmt: skip
 
 
 def silent() -> dict[str, Any]:
     """Options of IPOPT for a pose."""
-    settings = PoseSearch.current()
     return {
         "print_time": False,
         "error_on_fail": False,
         "inputs_check": False,  # CasADi would print that a pose has more equalities than variables
         "ipopt.print_level": 0,
         "ipopt.sb": "yes",
-        "ipopt.tol": settings.tol,
-        "ipopt.max_iter": settings.iterations,
+        "ipopt.tol": 1e-8,
+        "ipopt.max_iter": 150,
         "ipopt.bound_relax_factor": 0.0,
     }
 
@@ -70,12 +84,11 @@ class Poses:
         node, n = self.model.node, len(self.names)
         below, above, weight = ca.SX.sym("below", n), ca.SX.sym("above", n), ca.SX.sym("w", n + 1)
         height = quantity_expression(self.model, "body/z")
-        still = PoseSearch.current().still
         aims = ca.vertcat(*self.expressions.values())
         nlp = {
             "x": ca.vertcat(node.q, node.v, below, above),
             "p": weight,
-            "f": ca.dot(weight[:n], below + above) - weight[n] * height + still * ca.sumsqr(node.v),
+            "f": ca.dot(weight[:n], below + above) - weight[n] * height + STILL * ca.sumsqr(node.v),
             "g": ca.vertcat(aims + below - above, self.walls),
         }
         return ca.nlpsol("pose", "ipopt", nlp, silent())
@@ -145,8 +158,7 @@ class Poses:
         """The standing pose at rest, then others around it."""
         mechanism, rng = self.model.mechanism, np.random.default_rng(attempt)
         q = np.array([mechanism.standing[c.name] for c in mechanism.coordinates])
-        spread = PoseSearch.current().spread
-        away = rng.normal(size=len(q)) * [spread * c.scale for c in mechanism.coordinates]
+        away = rng.normal(size=len(q)) * [SPREAD * c.scale for c in mechanism.coordinates]
         return np.concatenate([q + away * (attempt > 0), np.zeros(len(q))])
 
     def _told(self, slack: np.ndarray, requirements: Sequence[Requirement]) -> list[Gap]:

@@ -14,12 +14,13 @@ import numpy as np
 
 from kemba.ocp.functions.problem import Derivatives, Program
 from kemba.ocp.functions.proximal import Proximal, regularised_hessian
-from kemba.ocp.functions.settings import Newton
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.watcher import Watch, Watcher
 from kemba.stopwatch import Stopwatch
 
 Bounds = tuple[np.ndarray, np.ndarray]  # lower and upper, in the shape of the program's
+
+WARM_PUSH = 1e-6  # distance from the bounds of a warm start, and least multiplier
 
 
 @dataclass(frozen=True)
@@ -80,13 +81,12 @@ def common() -> dict[str, Any]:
         "sb": "yes",
         "nlp_scaling_method": "none",
         "mu_strategy": "monotone",
-        "mumps_mem_percent": Newton.current().memory,
+        "mumps_mem_percent": 100,  # of room beyond the need; by default eleven times as much
     }
 
 
-def warm(mu: float, push: float | None = None, **more: Any) -> dict[str, Any]:
+def warm(mu: float, push: float = WARM_PUSH, **more: Any) -> dict[str, Any]:
     """IPOPT options of a warm start at barrier parameter `mu`, `push` off the bounds."""
-    push = Newton.current().warm_push if push is None else push
     names = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac", "mult_bound_push")
     pushed = {f"warm_start_{name}": push for name in names}
     return {"warm_start_init_point": "yes", **pushed, "mu_init": mu, **more}

@@ -27,6 +27,10 @@ LIFT = 0.05  # m; how high a foot swings over the line between its places
 FOLDED = 0.4  # leg length in flight, between retracted (0) and stretched (1)
 STANDS = 0.7  # the same where a flight begins or ends
 
+RISE = 0.7  # longest flight up to the apex, of the time before it: the push needs the rest
+LANDING = 0.3  # leg length after a landing, between retracted (0) and stretched (1)
+LEAST_FLIGHT = 0.05  # s; keeps the speed forward finite without a flight
+
 
 @dataclass(frozen=True)
 class Course:
@@ -90,7 +94,7 @@ def jump(
     z, az = course(t), course(t, 2)
     airborne = (t > course.flight[0]) & (t < course.flight[1])
     x0, way = _from_to(requirements, "body/x")
-    span = max(course.flight[1] - course.flight[0], Guess.current().least_flight)
+    span = max(course.flight[1] - course.flight[0], LEAST_FLIGHT)
     x = x0 + way * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
     stretched = reach[0] + Guess.current().stretch * (reach[1] - reach[0])
     feet = {}
@@ -113,10 +117,10 @@ def body_course(
 ) -> HeightCourse:
     """Height of the body over the motion; `reach` = leg length retracted and stretched [m],
     `ground` = height [m] where it starts and where it ends."""
-    settings, (first, last) = Guess.current(), ground
+    first, last = ground
     low, high = reach[0] + first, reach[1] + first
-    top = low + settings.stretch * (high - low)
-    lands_at, bent = top + last - first, low + settings.landing * (top - low) + last - first
+    top = low + Guess.current().stretch * (high - low)
+    lands_at, bent = top + last - first, low + LANDING * (top - low) + last - first
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)
     peaks = [
@@ -140,7 +144,7 @@ def body_course(
     if apex <= top:
         course = HeightCourse([0.0, t_apex], [z0, apex], [0.0, 0.0], (t_apex, t_apex))
     else:
-        longest = settings.rise * t_apex
+        longest = RISE * t_apex
         rise = min(float(np.sqrt(2 * (apex - top) / g)), longest)
         fall = min(float(np.sqrt(2 * max(apex - lands_at, 0.0) / g)), longest)
         speed = g * rise

@@ -14,10 +14,13 @@ from kemba.mechanism import Robot
 from kemba.mechanism.knee import extension, flexion
 from kemba.model import Model
 from kemba.ocp.relaxation.course import in_order, jump
-from kemba.ocp.relaxation.settings import Guess
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import Layout
+
+STEP = 1e-4  # rad, of the knee in differences: near the cube root of the rounding error
+FILLED = 300.0 / 324.0  # of the steady force, which a moving piston does not reach
+FILLING = 0.6  # time constant, of the fill time at full stroke: mid-push is 15 of 25 ms (Table I)
 
 
 def leg_pose(robot: Robot, fold: int, dx: np.ndarray, dz: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -78,10 +81,9 @@ def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
     def length(k: np.ndarray) -> np.ndarray:
         return np.asarray(np.hypot(f + b * np.cos(k), b * np.sin(k)))
 
-    step = Guess.current().difference
-    ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (step, -step))
+    ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (STEP, -STEP))
     dx = np.array(ahead, float) - np.array(behind, float)
-    return np.asarray((length(bend + step) - length(bend - step)) / dx)
+    return np.asarray((length(bend + STEP) - length(bend - STEP)) / dx)
 
 
 def _efforts(
@@ -91,9 +93,8 @@ def _efforts(
     u = np.zeros((len(t), len(model.inputs)))
     lam = np.zeros((len(t), len(model.forces)))
     cylinder = model.mechanism.need_cylinder()
-    settings = Guess.current()
-    full = settings.filled * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
-    rise = settings.filling * max(cylinder.fill)
+    full = FILLED * float(np.interp(model.supply, cylinder.pressures, cylinder.F_extend))
+    rise = FILLING * max(cylinder.fill)
     for i, (leg, symbol) in enumerate(model.states):
         if symbol == "F_e" and leg in piston:
             s[:, i] = np.clip(piston[leg], 0.0, full)

@@ -17,6 +17,9 @@ from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
 
+CONFIRMED = 1e-7  # scaled violation of the whole robot's rows that needs no further solve
+CONFIRM_MU = 1e-7  # barrier parameter of that solve: below the tolerance of a plan solved already
+
 
 def widen(half: Transcription, whole: Transcription, Y: np.ndarray) -> np.ndarray:
     """Y (nodes + 1, n) of the half robot as Y of the whole one."""
@@ -34,10 +37,10 @@ def confirm(schedule: Schedule, half: Transcription, point: Iterate) -> Iterate:
     start = replace(point, Y=widen(half, whole, point.Y), lam_x=None, lam_g=None)
     parameters = Parameters(Relaxation.current().margin * schedule.final_eps)
     g = np.array(whole.problem.g(start.Y.ravel(), parameters.vector(whole.nodes))).ravel()
-    if violation(whole, g) <= Ends.current().confirmed and point.ending is not None:
+    if violation(whole, g) <= CONFIRMED and point.ending is not None:
         schedule.attempts.append(Attempt("confirmed on the whole robot", point.ending, 0))
         return start
-    options, fixed = exact(Starts.current().confirm_mu), schedule.valves(start)
+    options, fixed = exact(CONFIRM_MU), schedule.valves(start)
     return schedule.solve("whole robot", start, parameters, options=options, fixed=fixed)
 
 

@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from kemba.ocp.nlp.ending import Ending, Stagnation
-from kemba.ocp.nlp.ipopt import Bounds, Iterate, warm
+from kemba.ocp.nlp.ipopt import WARM_PUSH, Bounds, Iterate, warm
 from kemba.ocp.relaxation.session import Schedule
-from kemba.ocp.relaxation.settings import Ends, Grids, Penalty, Relaxation, Starts
+from kemba.ocp.relaxation.settings import Ends, Grids, Relaxation, Starts
 from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import COST_SCALE
 from kemba.ocp.transcription.transcribe import Transcription
 
 RELAX = "relax"  # the name of a schedule's first solve
+
+EXACT_ROWS = 1e-8  # of the last solve: 100 times below the certificate's tolerance of 1e-6
 
 
 def interior(push: float | None = None) -> dict[str, Any]:
@@ -31,8 +33,8 @@ def exact(mu: float) -> dict[str, Any]:
 
     Rows are met tightly, since the certificate measures them; the cost needs few digits.
     """
-    ends = Ends.current()
-    return warm(mu, tol=ends.exact_tol, constr_viol_tol=ends.exact_rows, acceptable_iter=0)
+    tol = Ends.current().exact_tol
+    return warm(mu, tol=tol, constr_viol_tol=EXACT_ROWS, acceptable_iter=0)
 
 
 def find(schedule: Schedule, start: Iterate) -> Iterate:
@@ -46,7 +48,7 @@ def find(schedule: Schedule, start: Iterate) -> Iterate:
     return binary(schedule, point)
 
 
-def binary(schedule: Schedule, point: Iterate, push: float | None = None) -> Iterate:
+def binary(schedule: Schedule, point: Iterate, push: float = WARM_PUSH) -> Iterate:
     """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before; the
     start moves `push` off the bounds."""
     relaxation, starts, tol = Relaxation.current(), Starts.current(), Ends.current().tol
@@ -146,15 +148,18 @@ def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.nda
     return result
 
 
-METHODS = {"penalty": "single", "penalty_ramped": "ramp"}  # and the setting with their weights
+# weights rho of the paper's penalty method (eq. 9), and of a ramp that ends there
+PENALTIES = {"penalty": (1e4,), "penalty_ramped": (1e1, 1e2, 1e3, 1e4)}
+UNRELAXED = 1e6  # a relaxation so wide that the pairs' rows never bind
+RAMP_MU = 1e-2  # barrier parameter of the ramp's later solves
 
 
 def penalise(schedule: Schedule, start: Iterate, method: str) -> Iterate:
     """Solve with penalised pairs and valves; each step of a ramp starts from the last."""
-    task, point, settings = schedule.transcription.task, start, Penalty.current()
-    for number, rho in enumerate(getattr(settings, METHODS[method])):
+    task, point = schedule.transcription.task, start
+    for number, rho in enumerate(PENALTIES[method]):
         weight = rho * task.step / COST_SCALE
-        parameters = Parameters(settings.unrelaxed, valve=weight * task.nodes, pairs=weight)
-        options = warm(settings.ramp_mu) if number else {}
+        parameters = Parameters(UNRELAXED, valve=weight * task.nodes, pairs=weight)
+        options = warm(RAMP_MU) if number else {}
         point = schedule.solve(f"penalty, rho = {rho:g}", point, parameters, options=options)
     return point

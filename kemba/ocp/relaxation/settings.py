@@ -71,10 +71,6 @@ class Starts(Settings):
     tighten_mu: float = setting(
         1e-5, "1", "barrier parameter of the last solve", CHOSEN, decides=True
     )
-    confirm_mu: float = setting(
-        1e-7, "1", "barrier parameter of the whole robot's confirming solve",
-        "derived: below the tolerance of a plan that is solved already",
-    )  # fmt: skip
 
 
 class Ends(Settings):
@@ -87,10 +83,6 @@ class Ends(Settings):
     exact_tol: float = setting(
         1e-2, "1", "IPOPT's tolerance of the last solve: optimal to a few digits of the cost",
         CHOSEN, decides=True,
-    )  # fmt: skip
-    exact_rows: float = setting(
-        1e-8, "1", "tolerance of the rows in the last solve",
-        "derived: 100 times below the certificate's tolerance of 1e-6",
     )  # fmt: skip
     relax_iterations: int = setting(
         600, "1", "limit of the first solve; where there is a plan it takes 30 to 200",
@@ -107,10 +99,6 @@ class Ends(Settings):
     stagnation_near: float = setting(
         0.05, "1", "scaled violation from which the next solve may begin", CHOSEN, decides=True
     )
-    confirmed: float = setting(
-        1e-7, "1", "scaled violation of the whole robot's rows that needs no further solve",
-        "derived: 10 times below the certificate's tolerance of 1e-6",
-    )  # fmt: skip
 
 
 class Grids(Settings):
@@ -131,46 +119,3 @@ class Guess(Settings):
         0.92, "1", "leg length at take-off, between retracted (0) and stretched (1)",
         "convention: short of the stretched knee, where virtual work is singular", decides=True,
     )  # fmt: skip
-    rise: float = setting(
-        0.7, "1", "longest flight up to the apex, of the time before it",
-        "convention: the push needs the rest",
-    )  # fmt: skip
-    landing: float = setting(
-        0.3, "1", "leg length after a landing, between retracted (0) and stretched (1)",
-        "convention: a bent knee, when the task asks for nothing",
-    )  # fmt: skip
-    least_flight: float = setting(
-        0.05, "s", "shortest time in which the guess moves forward",
-        "convention: keeps the speed finite without a flight",
-    )  # fmt: skip
-    filled: float = setting(
-        300.0 / 324.0, "1", "largest chamber force of the guess, of the steady force",
-        "convention: a moving piston does not reach the steady force",
-    )  # fmt: skip
-    filling: float = setting(
-        0.6, "1", "time constant of the guess, of the fill time at full stroke",
-        "derived: 15 of 25 ms, the chamber in the middle of a push (Table I)",
-    )  # fmt: skip
-    difference: float = setting(
-        1e-4, "rad", "step of the knee in differences for virtual work",
-        "derived: near the cube root of the rounding error",
-    )  # fmt: skip
-
-
-class Penalty(Settings):
-    """The paper's penalty method, kept for comparison."""
-
-    single: tuple[float, ...] = setting(
-        (1e4,), "1", "weight rho of eq. 9", "literature: the paper's eq. 9"
-    )
-    ramp: tuple[float, ...] = setting(
-        (1e1, 1e2, 1e3, 1e4), "1", "weights of a ramp that ends at the paper's",
-        "literature: ramped penalties of the paper's reference",
-    )  # fmt: skip
-    unrelaxed: float = setting(
-        1e6, PAIR, "a relaxation so wide that the pairs' rows never bind",
-        "derived: above every product within the variables' bounds",
-    )  # fmt: skip
-    ramp_mu: float = setting(
-        1e-2, "1", "barrier parameter of the ramp's later solves", "convention: a warm start"
-    )

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from kemba.effects.pneumatics.supply_line import SupplyLine
+from kemba.effects.pneumatics.supply import SupplyLine
 from kemba.identify.infer.null_model import Baseline
 from kemba.identify.infer.structure import fitted_figures
 from kemba.identify.infer.windows import error_ratio

@@ -14,7 +14,7 @@ from mujoco_twin.machine import run
 from mujoco_twin.sensors import Sensors
 from robot_logs import hop
 
-from kemba.effects.mechanics.boom_lever import BoomLever
+from kemba.effects.mechanics.boom import BoomLever
 from kemba.identify.adopt import item
 from kemba.identify.discover import discover
 from kemba.identify.logs.reading import read_logs
