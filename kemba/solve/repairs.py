@@ -18,9 +18,9 @@ TICKS = "valve edges on the ticks of the controller"
 
 def repaired(first: Trial, planning: Planning, execution: TrialOrder) -> Iterator[Trial]:
     """The trial, and that with valve edges on ticks where only its table misses, or nearly does, on
-    the plan's own model. A plan that was not refined is not repaired."""
+    the plan's own model. A plan that was not refined, or whose time is over, is not repaired."""
     yield first
-    if first.fine or not first.judged or not first.plan.refined:
+    if first.fine or planning.over or not first.judged or not first.plan.refined:
         return
     if first.good or first.table_misses:
         execution.tell(TICKS)

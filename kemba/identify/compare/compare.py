@@ -189,8 +189,9 @@ def phrase(found: Comparison) -> str:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    clearest = "worst" if bad[0].ratio >= found.noise_ratio else "most surely"
-    worst = f"{clearest}: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
+    worst = f"most clearly seen in {place_of(bad[0])}"
+    if bad[0].ratio >= found.noise_ratio:  # two figures that contradict each other explain nothing
+        worst = f"worst: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
     if found.tolerable:
         return (
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
