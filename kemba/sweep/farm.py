@@ -7,10 +7,13 @@ import os
 import platform
 import re
 import socket
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
@@ -42,6 +45,7 @@ def run_cases(
     repeatedly is an error in the answer, but not in the folder, so the next run tries it again.
     Raises KembaError when the `scheduler` cannot be reached.
     """
+    due = time.monotonic() + (np.inf if time_limit is None else time_limit)
     (folder / "cases").mkdir(parents=True, exist_ok=True)
     found: dict[str, Record] = {}
     waiting: dict[str, Case] = {}
@@ -53,12 +57,12 @@ def run_cases(
             found[case.key] = record
     if waiting:
         with _client(scheduler, jobs, len(waiting)) as client:
-            found |= _gather(client, waiting, folder, time_limit, tell)
+            found |= _gather(client, waiting, folder, due, tell)
     return found
 
 
 def _gather(
-    client: Any, waiting: dict[str, Case], folder: Path, time_limit: float | None, tell: Tell
+    client: Any, waiting: dict[str, Case], folder: Path, due: float, tell: Tell
 ) -> dict[str, Record]:
     from distributed import TimeoutError as TimeIsUp
     from distributed import as_completed
@@ -71,7 +75,8 @@ def _gather(
         ): case
         for case in waiting.values()
     }  # fmt: skip
-    ended = as_completed(tasks, loop=client.loop, timeout=time_limit)
+    left = max(0.1, due - time.monotonic()) if np.isfinite(due) else None
+    ended = as_completed(tasks, loop=client.loop, timeout=left)
     try:
         for task in ended:
             case = tasks[task]
