@@ -28,6 +28,7 @@ Tell = Callable[[Case, Record], None]
 
 
 REACHING = 5.0  # s; for a connection to a scheduler (slow networks take a second)
+CLOSING = 3.0  # s that workers in the middle of a case take to end
 RESULT = 30.0  # s; for a result that a worker holds
 
 
@@ -75,7 +76,7 @@ def _gather(
         ): case
         for case in waiting.values()
     }  # fmt: skip
-    left = max(0.1, due - time.monotonic()) if np.isfinite(due) else None
+    left = max(0.1, due - CLOSING - time.monotonic()) if np.isfinite(due) else None
     ended = as_completed(tasks, loop=client.loop, timeout=left)
     try:
         for task in ended:
