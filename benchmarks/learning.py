@@ -32,8 +32,6 @@ from kemba.errors import KembaError
 from kemba.identify.adopt import item
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
-from kemba.rounds.correction import Aim, correction_from, flight_of
-from kemba.rounds.round import Asked, learn
 from kemba.model import load_spec
 from kemba.ocp import load_task, task_model
 from kemba.ocp.certificate.status import Status
@@ -41,6 +39,8 @@ from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
 from kemba.plotting.source import load_machine
 from kemba.report.solving import solve_into
+from kemba.rounds.correction import Aim, correction_from, flight_of
+from kemba.rounds.round import Asked, learn
 from kemba.runs import RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of

@@ -47,7 +47,7 @@ class Comparison:
     """What `compare` says; `good` where the error is within the noise.
 
     `noise_ratio`: error in units of the noise (see `error_ratio`). `tolerant_ratio`: the same if
-    the model's nominal figures took the best values within their usual tolerance; `tolerable`: that
+    the model's nominal figures were at their best, off by what is usual at most; `tolerable`: that
     would be within the noise everywhere.
     """
 
