@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from strangers.walk import HARD, typed
+from strangers.walk import typed
 
 ROOT = Path(__file__).parents[2]
 LEG = "{hip: 0.1 m, fold: 1}"
@@ -55,9 +55,8 @@ def test_a_mistake_is_answered_at_its_line(name: str, tmp_path: Path) -> None:
 
 
 def test_hard_sentences_stand_nowhere_in_the_source() -> None:
-    """Where a sentence is one text in the code; those that are put together the walks look for."""
-    words = [hard for hard in HARD if hard.isprintable() and not set(hard) & set("\\$|()")]
-    assert len(words) >= 3
+    """Those that are one text in the code; for those that are put together the walks look."""
+    words = ["gives different values", "within their usual tolerance", "tolerance asked for"]
     for file in [*ROOT.glob("kemba/**/*.py"), *ROOT.glob("cli/**/*.py")]:
         text = file.read_text(encoding="utf-8")
-        assert not [hard for hard in words if hard in text], file
+        assert not [word for word in words if word in text], file
