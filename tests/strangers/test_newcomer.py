@@ -25,8 +25,9 @@ LOOP = {
         "next: find what the model lacks: kemba-opt discover",
     ),
     "kemba-opt learn run-1 --logs logs-1 --out run-2": (
-        "Round #: the robot jumped # mm lower than planned. The model lacks chambers:orifice; with "
-        "it its error goes from # to # times the noise. The next run is expected to reach # m",
+        "Round #: the robot jumped # mm lower than planned. The model lacks chambers:orifice",
+        "its error goes from # to # times the noise. The next run is expected to reach # m (# to # "
+        "m), planned are # m.",
     ),
     "kemba-opt simulate run-2 --repeat 3 --noise --out logs-2": (
         "reached #, #, # m on plant, off the plan by at most # mm; # of # landed",
