@@ -1,6 +1,6 @@
 """Plans without and with pulses put in where the multipliers say that they pay.
 
-    python benchmarks/insertion.py --write    # the table of docs/refine.md
+    python benchmarks/insertion.py --write    # the table of docs/solving.md
 
 Each task is planned from its first guess twice, as it is and without pulses: cost in the task's
 own weights, phases, CPU seconds.
@@ -33,7 +33,7 @@ TASKS = (
     ("popup.yaml",),
     ("max_jump_land.yaml",),
 )
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "refine.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "solving.md"
 BEGIN, END = "<!-- pulses: written by benchmarks/insertion.py -->", "<!-- end of pulses -->"
 HEAD = ("| task | without: cost, phases | CPU s | with | CPU s |", "|---|---|---:|---|---:|")
 

@@ -2,7 +2,7 @@
 
 Hidden machines (benchmarks/hidden_machines.py) execute the shipped jump. Three ways to come nearer
 to it, three rounds of three jumps each: `learn` as the command does it, iterative learning alone
-(the correction of kemba/learn on the model as it is), and a plain least-squares fit of all
+(the correction of kemba/rounds on the model as it is), and a plain least-squares fit of all
 parameters at once. Every finished way of a machine is kept in the record; an interrupted study
 goes on, `--part 1/2` with every second machine. `--page` only writes the section of docs/learn.md.
 """
@@ -32,8 +32,6 @@ from kemba.errors import KembaError
 from kemba.identify.adopt import item
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
-from kemba.learn.correction import Aim, correction_from, flight_of
-from kemba.learn.round import Asked, learn
 from kemba.model import load_spec
 from kemba.ocp import load_task, task_model
 from kemba.ocp.certificate.status import Status
@@ -41,6 +39,8 @@ from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
 from kemba.plotting.source import load_machine
 from kemba.report.solving import solve_into
+from kemba.rounds.correction import Aim, correction_from, flight_of
+from kemba.rounds.round import Asked, learn
 from kemba.runs import RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from kemba.learn.correction import flight_of
 from kemba.plant.repeat import plant_of, repeat_run
 from kemba.plotting.source import load_machine
 from kemba.plotting.style import COLOURS, SHADE, key_above, paper_figure, paper_style, save_figure
+from kemba.rounds.correction import flight_of
 from kemba.runs import load_run
 from kemba.trajectory import Trajectory
 

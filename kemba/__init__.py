@@ -13,8 +13,10 @@ from typing import Any
 
 __version__ = "0.1.0"
 __all__ = [
+    "adopt",
     "compare",
     "discover",
+    "learn",
     "load_log",
     "load_model",
     "load_task",

@@ -1,5 +1,7 @@
+from kemba.api import adopt as adopt
 from kemba.api import compare as compare
 from kemba.api import discover as discover
+from kemba.api import learn as learn
 from kemba.api import load_log as load_log
 from kemba.api import load_model as load_model
 from kemba.api import load_task as load_task

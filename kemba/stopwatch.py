@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,16 @@ Tell = Callable[[str], None]  # gets the name of every stage of long work as it 
 
 def silent(text: str) -> None:
     """Tells nobody."""
+
+
+def watched() -> Tell:
+    """Tells stages and their times on stderr in notebooks and on terminals, nobody elsewhere."""
+    started = time.monotonic()
+
+    def tell(text: str) -> None:
+        print(f"{time.monotonic() - started:6.1f} s  {text}", file=sys.stderr, flush=True)
+
+    return tell if "ipykernel" in sys.modules or sys.stderr.isatty() else silent
 
 
 class Stage(str):

@@ -178,3 +178,43 @@ def units_below(log: Trajectory, path: Path) -> Path:
         stream.write("# Messung 12\n" + "\t".join(head) + "\n" + "\t".join(below) + "\n")
         np.savetxt(stream, np.column_stack(table), fmt="%.17g", delimiter="\t")
     return path
+
+
+def dataset(log: Trajectory) -> dict[str, dict[str, np.ndarray]]:
+    """Signals and fields of the paper's authors' logsOut."""
+    found = {"body": {"x": log["body/x"], "y": log["body/z"], "r": log["body/pitch"],
+                      "dx": np.gradient(log["body/x"], log.time),
+                      "dy": np.gradient(log["body/z"], log.time)}}  # fmt: skip
+    for leg, side in (("front", "R"), ("rear", "L")):
+        found[f"motor state ({side})"] = {"q": log[f"{leg}/hip/q"] - np.pi / 2}
+        found[f"piston state ({side})"] = {"p": log[f"{leg}/piston/x"]}
+        valves = {u: log[f"{leg}/valve/{v}"] for u, v in (("ue", "extend"), ("ur", "retract"))}
+        found[f"piston command ({side})"] = valves
+    return found
+
+
+def logs_out(log: Trajectory, path: Path, version: str = "v7") -> Path:
+    """The authors' logsOut: a Dataset of signals, each a struct of timeseries, as Simulink
+    logs buses; by mat-io in imitation of MATLAB."""
+    import matio
+    from matio.utils.matclass import MatlabOpaque
+
+    def series(name: str, values: np.ndarray) -> MatlabOpaque:
+        given = {"Name": name, "Data": values[:, None], "Time": log.time[:, None]}
+        return MatlabOpaque(properties=given, classname="timeseries")
+
+    elements = []
+    for name, fields in dataset(log).items():
+        kind = np.dtype([(field, object) for field in fields])
+        bus = np.empty((1, 1), dtype=kind)
+        for field, values in fields.items():
+            bus[field][0, 0] = series(field, values)
+        given = {"Name": name, "Values": bus}
+        elements.append(MatlabOpaque(properties=given, classname="Simulink.SimulationData.Signal"))
+    cell = np.empty((len(elements), 1), dtype=object)
+    for i, element in enumerate(elements):
+        cell[i, 0] = element
+    given = {"Name": "logsOut", "Elements": cell}
+    whole = MatlabOpaque(properties=given, classname="Simulink.SimulationData.Dataset")
+    matio.save_to_mat(path, {"logsOut": whole}, version=version)
+    return path

@@ -38,7 +38,7 @@ LEVELS = [
     {"solve"},
     {"plotting", "report"},
     {"sweep"},
-    {"learn"},
+    {"rounds"},
     {"api"},
     {"cli"},
 ]

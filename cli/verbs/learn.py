@@ -33,8 +33,8 @@ def learn(
     ] = None,
     column_map: Foreign = None,
     time_limit: Annotated[
-        float, typer.Option(min=5.0, help="Seconds of discovery at most.")
-    ] = 300.0,
+        float, typer.Option(min=5.0, help="Seconds at most; half of them for discovery.")
+    ] = 600.0,
     correct: Annotated[
         bool,
         typer.Option(
@@ -55,12 +55,9 @@ def learn(
 
     Example: kemba-opt learn runs/jump-1 --logs runs/jump-1/logs --target jump.yaml
     """
-    from kemba.config import find_config
-    from kemba.learn.page import write_learning
-    from kemba.learn.round import Asked
-    from kemba.learn.round import learn as learn_once
-    from kemba.ocp import load_task
-    from kemba.runs import RunFolder, load_run
+    from kemba.rounds.page import write_learning
+    from kemba.rounds.round import Asked, learn_into
+    from kemba.runs import load_run
     from kemba.solve import Listener
     from kemba_cli.next_steps import after_solve, say_next
     from kemba_cli.progress import LEARN, Progress
@@ -72,15 +69,9 @@ def learn(
     asked = Asked(
         folders, listed, task, overrides or [], holdout or [], column_map, time_limit, correct
     )
-    name = load_task(task, list(overrides or []))[0].name  # mistakes first, before minutes of work
-    folder = RunFolder.create(out, name, [find_config(task, "tasks"), *listed], force=force)
-    try:
-        with Progress(quiet or json, LEARN) as progress:
-            found = learn_once(asked, folder, Listener(progress.tell, progress.watch))
-    except BaseException:
-        if folder.lock is not None:
-            folder.finish("failed")
-        raise
+    with Progress(quiet or json, LEARN, time_limit) as progress:
+        listener = Listener(progress.tell, progress.watch)
+        found, folder = learn_into(asked, out, listener, force)
     page = write_learning(found, folder.path)
     if json:
         print_json(found.json())

@@ -42,6 +42,7 @@ def sweep(
 
     Example: kemba-opt sweep reliability.yaml --jobs 2
     """
+    due = None if time_limit is None else time.monotonic() + time_limit
     from kemba import sweep as room
     from kemba.folders import held
     from kemba_cli.next_steps import after_sweep, say_next
@@ -51,9 +52,7 @@ def sweep(
     asked, document = room.load_sweep(file, list(overrides or []))
     with held(out or Path("sweeps") / asked.name) as folder:
         room.open_folder(folder, asked, document)
-        status, good = _run(
-            folder, asked, document, scheduler, jobs, time_limit, figure, json, quiet
-        )
+        status, good = _run(folder, asked, document, scheduler, jobs, due, figure, json, quiet)
     say_next(after_sweep(file, folder, status == "finished"), quiet or json)
     if not good:
         raise typer.Exit(1)
@@ -65,7 +64,7 @@ def _run(
     document: Any,
     scheduler: str | None,
     jobs: int | None,
-    time_limit: float | None,
+    due: float | None,
     figure: bool,
     json: bool,
     quiet: bool,
@@ -79,7 +78,8 @@ def _run(
     status, records = "interrupted", {}
     try:
         with Bar(len(missing), len({case.key for case in cases}), quiet or json) as bar:
-            records = room.run_cases(cases, folder, scheduler, jobs, time_limit, bar.tell)
+            left = None if due is None else max(0.1, due - time.monotonic())
+            records = room.run_cases(cases, folder, scheduler, jobs, left, bar.tell)
         done = all(case.key in records for case in cases)
         status = "finished" if done else "limit"
     finally:

@@ -1,26 +1,28 @@
-"""`kemba.compare` and `kemba.discover`: where a model fails on logs, and which effect it lacks."""
+"""`kemba.compare`, `discover`, `adopt`, `learn`: where a model fails on logs, and what it lacks."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from kemba.api.planning import Result
+from kemba.api.planning import Planned, Result, settings
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer, Ranked
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.discover import Discovery
-from kemba.stopwatch import Tell, silent
+from kemba.stopwatch import Tell, watched
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from kemba.rounds.round import Round
+
 Logs = str | Path | Sequence[str | Path]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Compared(Result):
     """Where a model fails: errors by channel, phase and valve mode."""
 
@@ -48,12 +50,13 @@ class Compared(Result):
         return plot_comparison(self.comparison)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Discovered(Result):
-    """Which effect a model lacks, and how sure that is."""
+    """Which effect a model lacks, and how sure that is; `folder`: where it is written."""
 
     answer: Answer
     found: Discovery | None
+    folder: Path | None = None
 
     @property
     def sentence(self) -> str:
@@ -90,16 +93,16 @@ def compare(
     *,
     columns: str | Path | None = None,
     run: str | Path | None = None,
-    progress: Tell = silent,
+    progress: Tell | None = None,
 ) -> Compared:
     """Where `model` fails on logs of one machine, as `kemba-opt compare` says it.
 
-    `columns`: the file of a column map; `run`: the run that was executed. `progress` gets the
-    name of every stage. Raises KembaError.
+    `columns`: the file of a column map; `run`: the run that was executed. `progress`: as of
+    `kemba.plan`. Raises KembaError.
     """
     from kemba.identify.workflow import compare_logs
 
-    return Compared(compare_logs(_listed(logs), str(model), columns, run, progress)[0])
+    return Compared(compare_logs(_listed(logs), str(model), columns, run, progress or watched())[0])
 
 
 def discover(
@@ -110,7 +113,7 @@ def discover(
     columns: str | Path | None = None,
     out: str | Path | None = None,
     time_limit: float = 300.0,
-    progress: Tell = silent,
+    progress: Tell | None = None,
 ) -> Discovered:
     """Which physical effect `model` lacks, as `kemba-opt discover` answers it.
 
@@ -119,10 +122,86 @@ def discover(
     """
     from kemba.identify.workflow import discover_logs
 
+    tell = progress or watched()
     found = discover_logs(
-        _listed(logs), _listed(holdout), str(model), columns, time_limit, progress, out
+        _listed(logs), _listed(holdout), str(model), columns, time_limit, tell, out
     )
-    return Discovered(*found)
+    return Discovered(*found, None if out is None else Path(out))
+
+
+def adopt(
+    answer: Discovered | str | Path, effect: str | None = None, out: str | Path = "model.yaml"
+) -> Path:
+    """Write the model with what an answer found, or with another `effect` of its ranking.
+
+    `answer`: what `discover` gave, or its folder. Raises KembaError where nothing was found or
+    written, or `out` exists.
+    """
+    from kemba.folders import fresh
+    from kemba.identify.adopt import adopt_answer, adopt_effect
+
+    folder = answer.folder if isinstance(answer, Discovered) else answer
+    if folder is None:
+        hint = 'kemba.discover(logs, out="answer")'
+        raise KembaError("the answer", "was not written to a folder", hint=hint)
+    path = fresh(out)
+    if effect is None:
+        adopt_answer(folder, path)
+    else:
+        adopt_effect(folder, effect, path)
+    return path
+
+
+@dataclass(frozen=True, repr=False)
+class Learned(Result):
+    """One round of learning: what was found, and the next plan."""
+
+    round: Round
+    planned: Planned
+
+    @property
+    def sentence(self) -> str:
+        """The round in words."""
+        return self.round.sentence
+
+    @property
+    def good(self) -> bool:
+        """Whether the next plan is confirmed."""
+        return self.round.good
+
+    def figure(self) -> Figure:
+        """The next plan."""
+        return self.planned.figure()
+
+
+def learn(
+    runs: Planned | str | Path | Sequence[str | Path],
+    logs: Logs,
+    target: str | Path | None = None,
+    out: str | Path | None = None,
+    *,
+    holdout: Logs = (),
+    columns: str | Path | None = None,
+    time_limit: float = 600.0,
+    correct: bool = True,
+    progress: Tell | None = None,
+    **changes: Any,
+) -> Learned:
+    """Learn from executed runs and plan the next one, as `kemba-opt learn` does.
+
+    `target`: the task to plan, that of the last run by default; `changes` are those of `--set`;
+    `out`: its run folder. `time_limit` in s. Raises KembaError.
+    """
+    from kemba.rounds.round import Asked, learn_into
+    from kemba.runs import load_run
+    from kemba.solve import Listener
+
+    folders = [runs.path] if isinstance(runs, Planned) else _listed(runs)
+    task = target or load_run(folders[-1]).task
+    told = settings(changes), _listed(holdout), columns, time_limit, correct
+    asked = Asked(folders, _listed(logs), task, *told)
+    found, folder = learn_into(asked, out, Listener(progress or watched()))
+    return Learned(found, Planned.read(folder.path))
 
 
 def _listed(logs: Logs) -> list[str | Path]:

@@ -9,6 +9,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document, beside, find_config
@@ -27,11 +28,14 @@ from kemba.plant.repeat import Repeat, kept, plant_of, repeat_run
 from kemba.report.solving import solve_into
 from kemba.runs import Run, RunFolder, load_run
 from kemba.solve import Approach, Listener
-from kemba.stopwatch import Tell, silent
+from kemba.stopwatch import Tell, watched
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+ONE_LINE = 160  # characters of a result's repr
 
 
 class Result(ABC):
@@ -53,6 +57,9 @@ class Result(ABC):
 
     def __str__(self) -> str:
         return self.sentence
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}: {shorten(self.sentence, ONE_LINE)}"
 
     def _repr_html_(self) -> str:
         """Sentence and figure, for notebooks."""
@@ -98,7 +105,7 @@ def settings(changes: dict[str, Any]) -> list[str]:
     return [f"{key}={value}" for key, value in changes.items()]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Planned(Result):
     """A run folder and its certificate (the JSON of `solve`)."""
 
@@ -151,7 +158,7 @@ def plan(
     replay: bool = True,
     cold: bool = False,
     memory: bool = True,
-    progress: Tell = silent,
+    progress: Tell | None = None,
     **changes: Any,
 ) -> Planned:
     """Plan a motion and certify it, as `kemba-opt solve` does.
@@ -160,8 +167,8 @@ def plan(
     `changes` are those of `--set`: `height` is that of the body's centre (at 0.45 m the feet rise
     1 cm), `feet` that of the feet. `cold`: begin from a guess, also where an
     earlier plan of yours is near; `memory`: whether such plans are looked up, and this one listed.
-    `progress` gets the name of every stage. Raises KembaError for
-    mistakes; a task that cannot be met is no mistake, the certificate says why.
+    `progress` gets the name of every stage; by default notebooks and terminals show them. Raises
+    KembaError for mistakes; a task that cannot be met is none, the certificate says why.
     """
     if isinstance(task, Task):
         resolved, document = task, Document(task.model_dump())
@@ -178,14 +185,14 @@ def plan(
         folder,
         resolved,
         document,
-        Listener(progress),
+        Listener(progress or watched()),
         Approach(starts=starts, replay=replay, cold=cold, memory=memory),
         figure=False,
     )
     return Planned(folder.path, answer)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Executions(Result):
     """Executions of one run and the logs that were written."""
 
@@ -230,17 +237,17 @@ def simulate(
     noise: bool = False,
     seed: int = 0,
     force: bool = False,
-    progress: Tell = silent,
+    progress: Tell | None = None,
 ) -> Executions:
     """Execute a run's controller on the plant and write logs, as `kemba-opt simulate` does.
 
     `out`: folder for the logs, a new one in the run without it. The same `seed` gives the same
-    logs. `progress` gets the name of every execution. Raises KembaError where the run has no
+    logs. `progress`: as of `plan`. Raises KembaError where the run has no
     controller table.
     """
     path = run.path if isinstance(run, Planned) else Path(run)
     default = (path if path.is_dir() else path.parent) / "logs"
     model = plant_of(path, plant)
     with claimed(None if out is None else Path(out), default, "*.csv", force) as folder:
-        repeats = repeat_run(path, model, folder, repeat, noise, seed, tell=progress)
+        repeats = repeat_run(path, model, folder, repeat, noise, seed, tell=progress or watched())
     return Executions(path, model.name, tuple(repeats))

@@ -99,6 +99,9 @@ def _modes(log: Trajectory) -> set[str]:
 
 
 Paths = Sequence[str | Path]
+# what the end of an answer and its first fit take, in units of what comes before them (with three
+# logs of the shipped jump 20 s and 7 s after 5 s), and the drawing of its figures [s]
+ENDS, BEGINS, DRAWN = 4.0, 1.3, 5.0
 QUOTED = 3  # of so many logs one is kept aside for the error that is quoted, where none are given
 
 
@@ -115,7 +118,8 @@ def discover_logs(
 
     The errors that it tells are those of `compare` with the model that is written, on the logs of
     `holdout`; where there are none, on logs that are kept aside. Data that cannot be right give the
-    verdict `bad-data`, and nothing is fitted. Raises KembaError for files that cannot be read.
+    verdict `bad-data`, and nothing is fitted. Raises KembaError for files that cannot be read, and
+    for a `time_limit` [s] in which these logs cannot be answered.
     """
     started = time.monotonic()
     columns = load_map(column_map) if column_map else None
@@ -131,8 +135,7 @@ def discover_logs(
         problem, remarks = admitted(fitted, built)
         remarks = [*said, *evidence_faults(model), *built.remarks, *checked, *remarks]
         judge = make_problem(excerpts(kept)[0], built) if kept else None
-        left = time_limit - (time.monotonic() - started)
-        found = discover(problem, judge, left, say)
+        found = discover(problem, judge, _searching(time_limit, time.monotonic() - started), say)
         answer = found.answer
         say("comparing what is written with the quoted logs")
         _quote(answer, judge or problem, kept or fitted, model)
@@ -145,6 +148,17 @@ def discover_logs(
     if out is not None:
         write_answer(answer, Path(out), model)
     return answer, found
+
+
+def _searching(limit: float, begun: float) -> float:
+    """The time [s] for the search of an answer that may take `limit`, after `begun`. Raises
+    KembaError where there is none."""
+    left = limit - begun - ENDS * begun - DRAWN
+    if left < 0.0:
+        need = (1.0 + BEGINS + ENDS) * begun + DRAWN
+        what = f"{limit:g} s are too short for these logs, of which nothing was fitted"
+        raise KembaError("time limit", what, f"about {need:.0f} s are needed on this machine")
+    return left
 
 
 def _kept_aside(

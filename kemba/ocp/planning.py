@@ -9,6 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kemba.config import Document
 from kemba.errors import KembaError
 from kemba.model import Model
@@ -58,15 +60,17 @@ class Planning:
         watch: Watch | None = None,
         start: Trajectory | None = None,
         stop: Callable[[], bool] | None = None,
+        deadline: float = np.inf,
     ) -> Planning:
         """The planning of a task. Raises ConfigErrors for wrong names, units and solver options.
 
         `log` collects IPOPT's text, `tell` gets the name of every solve, `watch` is called after
         every iteration; `start` is a trajectory to begin with; `stop` is asked after every
-        iteration whether to end.
+        iteration whether to end. All is over at the `deadline` by `time.monotonic` [s] at the
+        latest.
         """
         document = document or Document(task.model_dump())
-        deadline = time.monotonic() + task.solver.time_limit
+        deadline = min(deadline, time.monotonic() + task.solver.time_limit)
         building, clock = Stopwatch(), Stopwatch()
         with building.running(), clock.running():
             if task.sequence:
@@ -75,6 +79,11 @@ class Planning:
                 built, requirements = asked_of(task, document, model)
         session = Session(Control(deadline, log, watch, stop), tell, building=building)
         return cls(document, Planner(task, built, requirements, session, start), clock)
+
+    @property
+    def over(self) -> bool:
+        """Whether the user or the time limit has ended it."""
+        return self.planner.session.control.ended() is not None
 
     @cached_property
     def diagnostics(self) -> Sequence[Diagnostic]:
@@ -96,6 +105,8 @@ class Planning:
             near, failed = self.continued(origin)
             if near is not None:
                 yield near
+                if self.over:
+                    return
                 failed = LEFT
             failed = failed if origin.given else ""
         task, planner = self.planner.task, self.planner
@@ -108,8 +119,8 @@ class Planning:
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
-            over = planner.session.control.ended() is not None or planner.start is not None
-            if over or not found.status.plan or task.refine != "radau":
+            only = planner.start is not None or task.refine != "radau"
+            if self.over or only or not found.status.plan:
                 return
 
     def continued(self, origin: Origin) -> tuple[Plan | None, str]:

@@ -54,6 +54,6 @@ def _unrefined(found: Plan, reason: str) -> Plan:
     implicit Euler, whose chambers and impacts are off; so it is not what was asked."""
     facts = found.sentence.removeprefix(f"{Status.SOLVED}: ")
     kept = f"not refined ({reason}), the implicit Euler plan is kept, whose air forces are inexact"
-    hint = "try other starts (--starts 4), more nodes, or accept it by --set refine=none"
+    hint = "try a larger --time-limit, other starts (--starts 4), or accept it by --set refine=none"
     sentence = f"{Status.ACCEPTABLE}: {facts}; {kept}; {hint}"
     return replace(found, status=Status.ACCEPTABLE, sentence=sentence)

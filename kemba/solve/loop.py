@@ -9,6 +9,7 @@ give the trial of the best score
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -27,6 +28,7 @@ from kemba.trajectory import Trajectory
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
 
+UNTRIED = "the time limit came before it was executed in any scenario"
 SPENT = ("attempts", "iterations", "solve_s", "solve_cpu_s", "build_s")  # what all trials add to
 
 
@@ -78,13 +80,15 @@ def best_plan(
     """The plan of a task, executed and judged: the first good one, or the best of all tried.
 
     `begun` gets each plan before it is executed, at last the one that is returned. `place`: the
-    run folder in the answer. Raises KembaError where the task or a file is wrong.
+    run folder in the answer. All of it ends at the task's `solver.time_limit`. Raises KembaError
+    where the task or a file is wrong.
     """
+    deadline = time.monotonic() + task.solver.time_limit
     begun = begun or (lambda plan: None)
     execution = TrialOrder(approach.replay, listener.tell, begun, place)
-    planning = _planning(task, document, approach, listener)
+    planning = _planning(task, document, approach, listener, deadline)
     best = last = None
-    for one in _candidates(planning, approach, listener):
+    for one in _candidates(planning, approach, listener, deadline):
         last = executed(one.plan, execution, one.table, one.share)
         best = last if best is None or last.score > best.score else best
         if best.good:
@@ -112,23 +116,25 @@ def _with_all(best: Trial, last: Trial) -> Trial:
     return replace(best, plan=plan, result=result)
 
 
-def _planning(task: Task, document: Document, approach: Approach, listener: Listener) -> Planning:
-    told: dict[str, Any] = {"log": approach.log, "tell": listener.tell}
+def _planning(
+    task: Task, document: Document, approach: Approach, listener: Listener, deadline: float
+) -> Planning:
+    told: dict[str, Any] = {"log": approach.log, "tell": listener.tell, "deadline": deadline}
     told |= {"watch": listener.watch, "stop": listener.stop}
     return Planning.of(task, document, start=approach.start, **told)
 
 
 def _candidates(
-    planning: Planning, approach: Approach, listener: Listener
+    planning: Planning, approach: Approach, listener: Listener, deadline: float
 ) -> Iterator[PlanCandidate]:
     """Plans of a task, made when asked for."""
     task, document = planning.planner.task, planning.document
     origin = approach.origin
     if approach.replay and task.robust > 0:
-        yield _most_robust(task, document, approach, listener)
+        yield _most_robust(task, document, approach, listener, deadline)
         return
     if approach.starts > 1:
-        told = approach.log, listener.tell
+        told = approach.log, listener.tell, deadline
         yield PlanCandidate(plan_best(task, document, approach.starts, approach.jobs, *told))
         return
     if approach.free and approach.memory:
@@ -140,19 +146,24 @@ def _candidates(
 
 
 def _most_robust(
-    task: Task, document: Document, approach: Approach, listener: Listener
+    task: Task, document: Document, approach: Approach, listener: Listener, deadline: float
 ) -> PlanCandidate:
     """The plan that succeeds in most of the task's scenarios."""
     from kemba.solve.robust import most_robust  # loads SciPy, which most plans do not need
 
     def solve(task: Task) -> Plan:
-        return next(_planning(task, document, approach, listener).plans(approach.origin))
+        planning = _planning(task, document, approach, listener, deadline)
+        return next(planning.plans(approach.origin))
 
     def changed(found: Plan, task: Task) -> Plan | None:
         known = found.trajectory, found.model, found.requirements
         names = "the plan as asked", "other starts (--starts 4) may take less"
         origin = Origin(*known, *names, once=True, stages=found.stages)
-        return _planning(task, document, approach, listener).continued(origin)[0]
+        planning = _planning(task, document, approach, listener, deadline)
+        return planning.continued(origin)[0]
 
-    found = most_robust(task, solve, changed, listener.tell)
-    return PlanCandidate(found.plan, found.table, found.share)
+    found = most_robust(task, solve, changed, listener.tell, deadline)
+    plan = found.plan
+    if plan.status.plan and found.share is None:
+        plan = replace(plan, sentence=f"{plan.sentence}; {UNTRIED}")
+    return PlanCandidate(plan, found.table, found.share)

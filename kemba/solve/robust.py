@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -56,18 +57,23 @@ class RobustCandidate:
 
 
 def most_robust(
-    task: Task, solve: Solve, change: Change, tell: Callable[[str], None]
+    task: Task,
+    solve: Solve,
+    change: Change,
+    tell: Callable[[str], None],
+    deadline: float = np.inf,
 ) -> RobustCandidate:
     """The plan that succeeds in most of `task.robust` scenarios of `task.uncertainties`.
 
     `solve` plans a task; `change` continues a plan for a changed task, None where that fails. Each
     plan is executed with its own hold and with a longer one. Where none is found, the first failed
-    one. Raises KembaError where the plant or the uncertainties are wrong.
+    one. After the `deadline` by `time.monotonic` [s] nothing more is tried. Raises KembaError where
+    the plant or the uncertainties are wrong.
     """
     plant = plant_of(task)
     cases = scenarios(task.uncertainties, plant, task.robust)
     share_equations(case.model for case in cases)  # few of them are executed first
-    search = _Search(plant, cases, tell)
+    search = _Search(plant, cases, tell, deadline)
     first = solve(task)
     search.take("as asked", first)
     for way in WAYS if first.status.plan else ():
@@ -82,13 +88,19 @@ def most_robust(
 
 @dataclass
 class _Search:
-    """The candidates so far; `over` where no other is to be tried."""
+    """The candidates so far; `done` where no other is to be tried."""
 
     plant: Model
     cases: list[Scenario]
     tell: Callable[[str], None]
+    deadline: float
     candidates: list[RobustCandidate] = field(default_factory=list)
-    over: bool = False
+    done: bool = False
+
+    @property
+    def over(self) -> bool:
+        """Whether no other is to be tried, or the time is over."""
+        return self.done or time.monotonic() >= self.deadline
 
     def along(self, way: Sequence[Way], found: Plan, change: Change) -> None:
         """Execute a plan after each change of a way, as far as it needs them."""
@@ -107,8 +119,8 @@ class _Search:
     def take(self, name: str, found: Plan) -> None:
         """Execute a plan in the first few scenarios, and in the others if it succeeds in all of
         these, with its own hold and with a longer one."""
-        self.over = found.status is Status.INTERRUPTED
-        if self.over or not found.status.plan:
+        self.done = found.status is Status.INTERRUPTED
+        if self.done or not found.status.plan:
             return
         own = found.task.hold
         for hold in sorted({own, max(own, HOLD)}):
@@ -120,28 +132,29 @@ class _Search:
             if one.landed == 1.0:
                 one = self._executed(one, len(self.cases))
             self.candidates.append(one)
-            if one.succeeds(ENOUGH):
-                self.over = True
+            self.done = one.succeeds(ENOUGH)
+            if self.over:
                 return
 
     def best(self) -> RobustCandidate | None:
-        """The best candidate, executed in all scenarios."""
+        """The best candidate, executed in all scenarios that the time was enough for."""
         while self.candidates:
             ranks = [one.rank for one in self.candidates]
             i = ranks.index(max(ranks))
             best = self.candidates[i]
-            if len(best.done) == len(self.cases):
+            self.candidates[i] = new = self._executed(best, len(self.cases))
+            if len(new.done) == len(best.done):
                 return best
-            self.candidates[i] = self._executed(best, len(self.cases))
         return None
 
     def _executed(self, one: RobustCandidate, until: int) -> RobustCandidate:
         """A candidate that is executed in the scenarios up to `until`."""
-        left, plan = self.cases[len(one.done) : until], one.plan
-        if not left or one.table is None:
-            return one
-        done = (*one.done, *outcomes(plan.model, plan.trajectory, one.table, left))
-        self.tell(f"{one.name}: {share_of(done).sentence}")
+        plan, done = one.plan, tuple(one.done)
+        while one.table is not None and len(done) < until and time.monotonic() < self.deadline:
+            left = self.cases[len(done) : min(until, len(done) + FEW)]
+            done += tuple(outcomes(plan.model, plan.trajectory, one.table, left))
+        if len(done) > len(one.done):
+            self.tell(f"{one.name}: {share_of(done).sentence}")
         return replace(one, done=done)
 
 

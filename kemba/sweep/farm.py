@@ -7,10 +7,13 @@ import os
 import platform
 import re
 import socket
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
@@ -25,6 +28,7 @@ Tell = Callable[[Case, Record], None]
 
 
 REACHING = 5.0  # s; for a connection to a scheduler (slow networks take a second)
+CLOSING = 3.0  # s that workers in the middle of a case take to end
 RESULT = 30.0  # s; for a result that a worker holds
 
 
@@ -42,6 +46,7 @@ def run_cases(
     repeatedly is an error in the answer, but not in the folder, so the next run tries it again.
     Raises KembaError when the `scheduler` cannot be reached.
     """
+    due = time.monotonic() + (np.inf if time_limit is None else time_limit)
     (folder / "cases").mkdir(parents=True, exist_ok=True)
     found: dict[str, Record] = {}
     waiting: dict[str, Case] = {}
@@ -53,12 +58,12 @@ def run_cases(
             found[case.key] = record
     if waiting:
         with _client(scheduler, jobs, len(waiting)) as client:
-            found |= _gather(client, waiting, folder, time_limit, tell)
+            found |= _gather(client, waiting, folder, due, tell)
     return found
 
 
 def _gather(
-    client: Any, waiting: dict[str, Case], folder: Path, time_limit: float | None, tell: Tell
+    client: Any, waiting: dict[str, Case], folder: Path, due: float, tell: Tell
 ) -> dict[str, Record]:
     from distributed import TimeoutError as TimeIsUp
     from distributed import as_completed
@@ -71,7 +76,8 @@ def _gather(
         ): case
         for case in waiting.values()
     }  # fmt: skip
-    ended = as_completed(tasks, loop=client.loop, timeout=time_limit)
+    left = max(0.1, due - CLOSING - time.monotonic()) if np.isfinite(due) else None
+    ended = as_completed(tasks, loop=client.loop, timeout=left)
     try:
         for task in ended:
             case = tasks[task]

@@ -65,12 +65,14 @@ def logs(*names: str) -> Given:
 
 
 def their_log(folder: Path) -> None:
-    """The same, as another program writes it."""
-    from foreign_files import german
+    """The same, as two other programs write it."""
+    from foreign_files import german, logs_out
     from robot_logs import hops
     from twin import catalogue
 
-    german(hops(catalogue.hidden("seal_friction", 1.0), runs=1)[0][0], folder / "their_log.csv")
+    log = hops(catalogue.hidden("seal_friction", 1.0), runs=1)[0][0]
+    german(log, folder / "their_log.csv")
+    logs_out(log, folder / "logsOut.mat")
 
 
 def drives(folder: Path) -> None:
@@ -126,7 +128,9 @@ STORIES: dict[str, Story] = {
     ),
     "library.md": Story(),
     "logs.md": Story(
-        (their_log,), instead={"MAP.yaml": "their_log_map.yaml"}, ends={"review": (0, 1)}
+        (their_log, drives, of_the_page("logs.md", "yaml", press_yaml=1, known_yaml=2)),
+        instead={"MAP.yaml": "their_log_map.yaml"},
+        ends={"review": (0, 1)},
     ),
     "missing.md": Story(
         (
@@ -146,9 +150,6 @@ STORIES: dict[str, Story] = {
             "kemba-opt discover logs/*.csv --out answer --time-limit 60 -q",
         ),
         ends={"review": (0, 1), "--model answer-1": PLANNED},  # whatever it says of the logs
-    ),
-    "rigs.md": Story(
-        (drives, of_the_page("rigs.md", "yaml", press_yaml=0, known_yaml=1)),
     ),
     "robots.md": Story(
         (write("mine/model.yaml", blocks("robots.md", "yaml")[0]),),

@@ -16,7 +16,9 @@ ROOT = Path(__file__).parents[2]
 
 
 TABLES, FOREIGN = (
-    (ROOT / "docs" / "examples.md").read_text(encoding="utf-8").split("\n## Example: ")
+    (ROOT / "benchmarks" / "pages" / "examples.md")
+    .read_text(encoding="utf-8")
+    .split("\n## Example: ")
 )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_files import robot_log
+from foreign_files import logs_out, robot_log
 from mcap.writer import CompressionType, Writer
 from scipy.io import savemat
 
@@ -295,47 +295,13 @@ def test_mcap_of_protobuf(tmp_path: Path) -> None:
     assert "/camera is not read: its messages are h264" in log.meta["read"][0]
 
 
-def dataset(log: Trajectory) -> dict[str, dict[str, np.ndarray]]:
-    """Signals and fields of the paper's authors' logsOut."""
-    found = {"body": {"x": log["body/x"], "y": log["body/z"], "r": log["body/pitch"],
-                      "dx": np.gradient(log["body/x"], log.time),
-                      "dy": np.gradient(log["body/z"], log.time)}}  # fmt: skip
-    for leg, side in (("front", "R"), ("rear", "L")):
-        found[f"motor state ({side})"] = {"q": log[f"{leg}/hip/q"] - np.pi / 2}
-        found[f"piston state ({side})"] = {"p": log[f"{leg}/piston/x"]}
-        valves = {u: log[f"{leg}/valve/{v}"] for u, v in (("ue", "extend"), ("ur", "retract"))}
-        found[f"piston command ({side})"] = valves
-    return found
-
-
 @pytest.mark.parametrize("version", ["v7", "v7.3"])
 def test_logs_out_of_simulink(version: str, tmp_path: Path) -> None:
     """A Dataset of signals whose values are structs of timeseries, as Simulink logs buses; the
     shipped map gives the robot's columns at once. Written by mat-io in imitation of MATLAB."""
-    matio = pytest.importorskip("matio")
-    from matio.utils.matclass import MatlabOpaque
-
+    pytest.importorskip("matio")
     log = robot_log(200)
-
-    def series(name: str, values: np.ndarray) -> MatlabOpaque:
-        given = {"Name": name, "Data": values[:, None], "Time": log.time[:, None]}
-        return MatlabOpaque(properties=given, classname="timeseries")
-
-    elements = []
-    for name, fields in dataset(log).items():
-        kind = np.dtype([(field, object) for field in fields])
-        bus = np.empty((1, 1), dtype=kind)
-        for field, values in fields.items():
-            bus[field][0, 0] = series(field, values)
-        given = {"Name": name, "Values": bus}
-        elements.append(MatlabOpaque(properties=given, classname="Simulink.SimulationData.Signal"))
-    cell = np.empty((len(elements), 1), dtype=object)
-    for i, element in enumerate(elements):
-        cell[i, 0] = element
-    given = {"Name": "logsOut", "Elements": cell}
-    whole = MatlabOpaque(properties=given, classname="Simulink.SimulationData.Dataset")
-    path = tmp_path / "logsOut.mat"
-    matio.save_to_mat(path, {"logsOut": whole}, version=version)
+    path = logs_out(log, tmp_path / "logsOut.mat", version)
     back = open_log(path, load_map("logsout"))
     assert back.time == pytest.approx(log.time)
     for name in back.names:

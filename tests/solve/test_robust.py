@@ -123,3 +123,21 @@ def test_where_it_falls_other_plans_are_tried(tmp_path: Path) -> None:
     assert changed[2].grip < 1.0, "at last less friction"
     assert [t.seed for t in solved] == [0, 1], "as asked, then from another start"
     assert found.plan.task == task, "the only plan there is"
+
+
+def test_after_the_deadline_nothing_more_is_tried(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock of our own: over when the first plan is there."""
+    grounds(tmp_path, 0.3)
+    now = [0.0]
+    monkeypatch.setattr("kemba.solve.robust.time.monotonic", lambda: now[0])
+    solved, changed, solve, change = solving(0.84)
+
+    def late(task: Task) -> Plan:
+        now[0] = 11.0
+        return solve(task)
+
+    task = asked(0.84, 6, tmp_path / "slippery.yaml")
+    found = most_robust(task, late, change, lambda text: None, deadline=10.0)
+    assert found.share is None and len(solved) == 1 and not changed

@@ -47,7 +47,7 @@ class Comparison:
     """What `compare` says; `good` where the error is within the noise.
 
     `noise_ratio`: error in units of the noise (see `error_ratio`). `tolerant_ratio`: the same if
-    the model's nominal figures took the best values within their usual tolerance; `tolerable`: that
+    the model's nominal figures were at their best, off by what is usual at most; `tolerable`: that
     would be within the noise everywhere.
     """
 
@@ -188,8 +188,9 @@ def phrase(found: Comparison) -> str:
         return f"The model explains the logs to within the noise: its error is {ratio}."
     if not bad:
         return f"The model's error is {ratio}; no single condition stands out."
-    clearest = "worst" if bad[0].ratio >= found.noise_ratio else "most surely"
-    worst = f"{clearest}: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
+    worst = f"most clearly seen in {place_of(bad[0])}"
+    if bad[0].ratio >= found.noise_ratio:  # two figures that contradict each other explain nothing
+        worst = f"worst: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
     if found.tolerable:
         return (
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "

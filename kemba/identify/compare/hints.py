@@ -126,7 +126,9 @@ def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it explains enough."""
     plain = ForceProfileSettings.plain
     best = max(found, key=lambda profile: profile.gain, default=None)
-    return [Hint("law", str(best), best.gain)] if best and best.gain > plain else []
+    return (
+        [Hint("law", str(best), best.gain)] if best and best.gain > plain and best.largest else []
+    )
 
 
 def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:

@@ -266,7 +266,7 @@ def taken_on(logs: Iterable[Trajectory], mechanism: Mechanism) -> None:
         if log.meta["kind"] in OWN_RIGS:
             what = f"is a log of a {log.meta['kind']} rig, and the model has no such rig"
             expected = f"a model with `rig: {{kind: {log.meta['kind']}, ...}}` was expected"
-            hint = "name it with --model; docs/rigs.md shows one"
+            hint = "name it with --model; docs/logs.md shows one"
             raise KembaError(str(log.meta.get("path", log.meta["name"])), what, expected, hint)
         log.meta["stroke"] = mechanism.stroke
         if log.meta["kind"] == "robot":

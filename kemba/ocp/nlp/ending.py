@@ -16,8 +16,8 @@ class Ending(str, Enum):
 
     sentence: str
 
-    SOLVED = "solved", "the solver converged to the tolerance asked for"
-    ACCEPTABLE = "acceptable", "the solver converged to a looser tolerance"
+    SOLVED = "solved", "the solver found a best point"
+    ACCEPTABLE = "acceptable", "the solver nearly found a best point"
     INFEASIBLE = "infeasible", "the solver found no point near its last one that violates less"
     STALLED = "stalled", "the solver's steps became too small to make progress"
     GAVE_UP = "gave-up", "the violation stopped falling, so the solve was given up"

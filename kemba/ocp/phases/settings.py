@@ -1,10 +1,10 @@
-"""Settings of the refinement: how modes are read, solved and repaired. See docs/refine.md."""
+"""Settings of the refinement: how modes are read, solved and repaired. See docs/solving.md."""
 
 from __future__ import annotations
 
 from kemba.settings import Settings, setting
 
-TRIALS = "tuned: trials that docs/refine.md describes"
+TRIALS = "tuned: trials that docs/solving.md describes"
 HAND = "convention: chosen by hand on the cases of benchmarks/refine.py, no comparison kept"
 STEPS = "derived: implicit Euler smears an impact over two steps"
 
@@ -76,7 +76,7 @@ class Elements(Settings):
     )  # fmt: skip
     vented: float = setting(
         0.01, "1", "of a state's range: room below its lower bound, since a vented chamber stays "
-        "exactly there", "tuned: without it IPOPT did not converge (docs/refine.md)",
+        "exactly there", "tuned: without it IPOPT did not converge (docs/solving.md)",
     )  # fmt: skip
     leeway: float = setting(
         1e-4, "1", "scaled slack beyond what a start needs", "convention: off the bounds"

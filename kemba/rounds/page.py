@@ -8,8 +8,6 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from kemba.learn.outcome import ExpectedApex, effects
-from kemba.learn.round import Round
 from kemba.ocp import load_task, task_model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute
@@ -18,6 +16,8 @@ from kemba.plotting.style import svg_text
 from kemba.report.charts import pairs, table
 from kemba.report.verdict import ReviewVerdict
 from kemba.report.view import write_page
+from kemba.rounds.outcome import ExpectedApex, effects
+from kemba.rounds.round import Round
 
 Rows = Iterable[tuple[str, Any]]
 

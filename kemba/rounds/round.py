@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.config import Document, beside, dump_yaml
+from kemba.config import Document, beside, dump_yaml, find_config
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256, write_json
 from kemba.identify.adopt import reference, write_model
@@ -18,8 +19,15 @@ from kemba.identify.answer import Answer
 from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
-from kemba.learn import outcome
-from kemba.learn.correction import (
+from kemba.logs import load_map
+from kemba.model import Model, load_spec
+from kemba.ocp import Task, load_task, task_model
+from kemba.plant.certificate import rest_after
+from kemba.plant.controller import execute, read_controller
+from kemba.plotting.source import Machine, load_machine
+from kemba.report.solving import solve_into
+from kemba.rounds import outcome
+from kemba.rounds.correction import (
     Aim,
     Aimed,
     Correction,
@@ -29,14 +37,7 @@ from kemba.learn.correction import (
     scatter_of,
     write_correction,
 )
-from kemba.learn.outcome import ExpectedApex, band_about, expected_of
-from kemba.logs import load_map
-from kemba.model import Model, load_spec
-from kemba.ocp import Task, load_task, task_model
-from kemba.plant.certificate import rest_after
-from kemba.plant.controller import execute, read_controller
-from kemba.plotting.source import Machine, load_machine
-from kemba.report.solving import solve_into
+from kemba.rounds.outcome import ExpectedApex, band_about, expected_of
 from kemba.runs import Run, RunFolder, load_run
 from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of
@@ -179,6 +180,7 @@ def as_executed(model: str, task: Task, path: Path) -> str:
 
 
 PLAIN = "controller_uncorrected.csv"
+PLANNING = 0.8  # share of the time left that the plan may take; the rest is for its correction
 
 
 @dataclass(frozen=True)
@@ -191,7 +193,7 @@ class Asked:
     overrides: Sequence[str] = ()
     holdout: Sequence[str | Path] = ()
     column_map: str | Path | None = None
-    time_limit: float = 300.0  # of discover [s]
+    time_limit: float = 600.0  # of the round [s]
     correct: bool = True
 
 
@@ -283,11 +285,29 @@ class Round:
         )
 
 
+def learn_into(
+    asked: Asked, out: str | Path | None, listener: Listener, force: bool = False
+) -> tuple[Round, RunFolder]:
+    """One round in a new run folder, `out` or a numbered one. Raises KembaError as `learn`."""
+    name = load_task(asked.target, list(asked.overrides))[0].name  # mistakes first
+    inputs = [find_config(asked.target, "tasks"), *asked.logs]
+    folder = RunFolder.create(out, name, inputs, force=force)
+    try:
+        return learn(asked, folder, listener), folder
+    except BaseException:
+        if folder.lock is not None:
+            folder.finish("failed")
+        raise
+
+
 def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     """One round, written to `folder`: model, plan, corrected table, learning.json.
 
+    Half of its time limit is for discovery, most of what is then left for the plan.
+
     Raises KembaError where runs, logs and target do not fit together, or the logs cannot be right.
     """
+    due = time.monotonic() + asked.time_limit
     columns = load_map(asked.column_map) if asked.column_map else None
     logs = read_logs(asked.logs, columns)
     past = past_of(asked.runs, logs, asked.holdout)
@@ -295,10 +315,12 @@ def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     old = load_task(run.task)[0]
     found = _learnt(asked, past, run, old, folder, listener.tell)
     task, document = load_task(asked.target, list(asked.overrides))
-    update = {"model": found.model, "plant": beside(task.plant, Path())}
-    task = task.model_copy(update=update)
+    update: dict[str, Any] = {"model": found.model, "plant": beside(task.plant, Path())}
     if asked.correct:
         found = _with_correction(found, old, run)
+    left = min(task.solver.time_limit, max(0.1, PLANNING * (due - time.monotonic())))
+    update["solver"] = task.solver.model_copy(update={"time_limit": left})
+    task = task.model_copy(update=update)
     return _planned(found, task, document, folder, listener)
 
 
@@ -311,7 +333,7 @@ def _learnt(
     out.mkdir()
     here = as_executed(old.model, old, out / "model_of_the_run.yaml")
     answer, discovery = discover_logs(
-        past.logs, asked.holdout, here, asked.column_map, asked.time_limit, tell, out
+        past.logs, asked.holdout, here, asked.column_map, asked.time_limit / 2.0, tell, out
     )
     if answer.verdict == "bad-data":
         raise KembaError("--logs", answer.sentence, hint="see kemba-opt check LOG")

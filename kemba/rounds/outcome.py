@@ -16,9 +16,9 @@ import numpy as np
 from kemba.errors import KembaError, enumerated
 from kemba.files import read_json
 from kemba.identify.answer import Answer
-from kemba.learn.correction import flight_of
 from kemba.model import Model, load_spec
 from kemba.plotting.source import Machine
+from kemba.rounds.correction import flight_of
 from kemba.runs import Run
 from kemba.solve.truth import on_drawn_models
 from kemba.trajectory import Trajectory

@@ -13,7 +13,12 @@ import pytest
 from kemba.config import dump_yaml, load_yaml
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer
-from kemba.learn.correction import (
+from kemba.model import load_model
+from kemba.model.changes import drawn_models
+from kemba.model.evidence import write_covariance
+from kemba.ocp import load_task
+from kemba.plotting.source import load_machine
+from kemba.rounds.correction import (
     Correction,
     CorrectionSettings,
     FlownJump,
@@ -22,14 +27,9 @@ from kemba.learn.correction import (
     scatter_of,
     write_correction,
 )
-from kemba.learn.outcome import ExpectedApex, band_about
-from kemba.learn.page import verdict_of
-from kemba.learn.round import Round, as_executed, entry, past_of, sent
-from kemba.model import load_model
-from kemba.model.changes import drawn_models
-from kemba.model.evidence import write_covariance
-from kemba.ocp import load_task
-from kemba.plotting.source import load_machine
+from kemba.rounds.outcome import ExpectedApex, band_about
+from kemba.rounds.page import verdict_of
+from kemba.rounds.round import Round, as_executed, entry, past_of, sent
 from kemba.trajectory import Trajectory
 
 

@@ -1,0 +1,50 @@
+"""Results of the library in one line, progress where a person watches, and adopting an answer."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+
+import kemba
+from kemba.api import Discovered, Planned
+from kemba.errors import KembaError
+from kemba.identify.answer import Answer
+from kemba.identify.workflow import _searching
+from kemba.stopwatch import silent, watched
+
+
+def test_a_result_is_one_short_line() -> None:
+    text = "solved: apex 0.480 m" + ", and more of it" * 30
+    shown = repr(Planned(Path("run"), {"sentence": text, "good": True}))
+    assert shown.startswith("Planned: solved: apex 0.480 m") and "\n" not in shown
+    assert len(shown) < 180
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_progress_is_shown_where_someone_watches(
+    there: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    screen = io.StringIO()
+    monkeypatch.setattr(screen, "isatty", lambda: there)
+    monkeypatch.setattr("sys.stderr", screen)
+    monkeypatch.delitem(__import__("sys").modules, "ipykernel", raising=False)
+    tell = watched()
+    tell("fitting")
+    assert screen.getvalue() == ("   0.0 s  fitting\n" if there else "")
+    assert (tell is silent) is not there
+
+
+def test_an_answer_without_a_folder_is_not_adopted(tmp_path: Path) -> None:
+    with pytest.raises(KembaError, match="was not written to a folder"):
+        kemba.adopt(Discovered(Answer("missing"), None), out=tmp_path / "model.yaml")
+    with pytest.raises(KembaError, match=r"holds no answer\.json"):
+        kemba.adopt(tmp_path, out=tmp_path / "model.yaml")
+
+
+def test_a_search_leaves_time_for_the_end_of_its_answer() -> None:
+    assert _searching(300.0, 5.0) == pytest.approx(270.0)
+    told = "20 s are too short for these logs, of which nothing was fitted; about 36 s are needed"
+    with pytest.raises(KembaError, match=told):
+        _searching(20.0, 5.0)
