@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution
 from kemba.effects.pneumatics.orifice import OrificeChamber
@@ -46,6 +46,7 @@ class OrificeShare(OrificeChamber):
     `level` scales the pressure that reaches the valves.
     """
 
+    kind: Literal["orifice_chamber"] = "orifice_chamber"
     a: Annotated[float, Param("1", 1.0, lower=0.0, upper=1.0, doc="share")] = 0.0
     level: Annotated[float, Param("1", 0.04, lower=0.0, doc="scale of the gauge pressure")] = 1.0
 
@@ -146,6 +147,7 @@ LINE_REACH = 30.0  # a volume is looked for within this factor
 class LineResistance(SupplyLine):
     """The supply line by the reciprocal `r` of its orifice."""
 
+    kind: Literal["supply_line"] = "supply_line"
     r: Annotated[float, Param("m-2", 1.5e5, lower=0.0, doc="1/a, 0: no orifice")] = 0.0
 
     off: ClassVar[dict[str, float]] = {"r": 0.0}
