@@ -95,6 +95,7 @@ class Left:
     course: Course
     limit: float | None = None
     share: float = 0.0  # of the work that is done
+    once: bool = False  # a stage of unknown length, the first time on a machine
     until: float = 0.0  # share at the end of this stage
 
     def __post_init__(self) -> None:
@@ -102,6 +103,7 @@ class Left:
 
     def enter(self, stage: str) -> None:
         """A stage begins. One that usually comes earlier does not undo what was reached."""
+        self.once = stage.startswith("compiling")
         if self.course is SOLVE and stage.startswith("from the"):
             self.course = NEAR
         elif self.course is NEAR and stage.startswith("relax"):  # that failed: from a guess
@@ -135,7 +137,7 @@ class Left:
     def words(self) -> str:
         """The time left in words; empty while nothing can be said."""
         seconds = self.seconds
-        if seconds is None:
+        if seconds is None or self.once:
             return ""
         return f"{'about' if self.known else 'at most'} {duration(seconds)} left"
 

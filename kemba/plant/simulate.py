@@ -20,6 +20,7 @@ from kemba.plant.commands import SAME_TIME, Commands, delayed
 from kemba.plant.equations import equations_of, share_equations
 from kemba.plant.kernel.machine import LONGEST_STEP, Array
 from kemba.plant.record import Impact, trajectory
+from kemba.stopwatch import Tell
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -235,6 +236,15 @@ def _compiler() -> subprocess.Popen[bytes]:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
+
+
+def wait_for_compiler(tell: Tell) -> None:
+    """Say so and wait where the simulator is compiled for the first time on this machine."""
+    from kemba.plant.kernel.jit import is_kept
+
+    if not is_kept("play"):
+        tell("compiling the simulator, once on this machine")
+        compile_kernel()
 
 
 def compile_kernel() -> None:

@@ -13,6 +13,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, lacking
 from kemba.plant.retiming import retimed
+from kemba.plant.simulate import wait_for_compiler
 from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
@@ -96,6 +97,7 @@ def executed(
         execution.begun(found.trajectory)
     if table is None or not execution.replay or not found.status.plan:
         return Trial(found, result, Motions(table))
+    wait_for_compiler(execution.tell)
     execution.tell("replay: the times of controller.csv")
     known = None
     if share is None:

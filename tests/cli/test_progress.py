@@ -101,6 +101,18 @@ def test_how_many_plans_a_robust_task_tries_is_not_guessed(clock: Clock) -> None
     assert left.words == "about 1 s left"
 
 
+def test_nothing_is_said_of_the_time_of_a_compiler(clock: Clock) -> None:
+    left = Left({"first": 0.0, "second": 0.25, "third": 0.75})
+    left.enter("first")
+    clock.now += 10.0
+    left.enter("second")
+    assert left.words
+    left.enter("compiling the simulator, once on this machine")
+    assert not left.words
+    left.enter("third")
+    assert left.words
+
+
 def test_a_limit_bounds_the_time_left(clock: Clock) -> None:
     left = Left({"first": 0.0, "second": 0.2}, limit=60.0)
     assert left.words == "at most 60 s left"

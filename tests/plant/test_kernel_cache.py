@@ -99,3 +99,12 @@ def test_the_first_time_a_second_process_compiles(
     monkeypatch.setattr(jit, "FOLDER", None)
     loading._load()
     assert len(started) == 1
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_who_waits_for_the_compiler_is_told(monkeypatch: pytest.MonkeyPatch, kept: bool) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(jit, "is_kept", lambda name: kept)
+    monkeypatch.setattr(loading, "compile_kernel", lambda: done.append("compiled"))
+    loading.wait_for_compiler(done.append)
+    assert done == ([] if kept else ["compiling the simulator, once on this machine", "compiled"])
