@@ -11,6 +11,7 @@ from kemba.ocp import load_task
 from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
 from kemba.ocp.functions.code import FEW, Code, Functions, code_of, vectorised
 from kemba.ocp.functions.proximal import Newton, Proximal, regularised_hessian
+from kemba.ocp.functions.signs import canonical_signs
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
@@ -50,6 +51,33 @@ def test_abreast_repeats_what_is_the_same_at_all_points() -> None:
     values, nothing = vectorised(f, POINTS, [1])(np.arange(POINTS)[None, :], 3.0)
     assert np.array(values).tolist() == [[3.0 * i for i in range(POINTS)], [4.0] * 12, [2.5] * 12]
     assert nothing.shape == (0, POINTS)
+
+
+def test_folding_writes_a_mirrored_leg_once() -> None:
+    q, a, b = ca.SX.sym("q"), ca.SX.sym("a"), ca.SX.sym("b")
+
+    def leg(q: ca.SX, b: ca.SX) -> ca.SX:
+        return (a - b * ca.sin(q)) * ca.cos(q) + ca.atan(q) * b / a
+
+    plain = leg(q, b) + leg(-q, -b)
+    (once,) = canonical_signs([q, a, b], [plain])
+    count = ca.Function("f", [q, a, b], [leg(q, b)]).n_instructions()
+    f, g = ca.Function("f", [q, a, b], [plain]), ca.Function("g", [q, a, b], [once])
+    assert g.n_instructions() == count + 1 < f.n_instructions()
+    for at in np.random.default_rng(0).normal(size=(20, 3)):
+        assert float(f(*at)) == float(g(*at))
+
+
+def test_folding_shares_the_legs_of_half_a_robot(half: Transcription) -> None:
+    stage = half.stage
+    at = [ca.vertcat(stage.y0, stage.y), ca.vertcat(stage.eps, stage.weights)]
+    plain = ca.Function("f", at, [ca.cse(ca.densify(stage.g))])
+    once = ca.Function("g", at, [ca.cse(canonical_signs(at, [stage.g])[0])])
+    assert once.n_instructions() < 0.8 * plain.n_instructions()
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        z, p = rng.uniform(0.2, 0.9, at[0].numel()), [1e-3, 0.1, 0.1, 0.1, 1e-5]
+        assert np.array_equal(np.array(plain(z, p)), np.array(once(z, p)))
 
 
 def test_a_proximal_term_adds_half_the_squared_way() -> None:

@@ -17,6 +17,7 @@ import numpy as np
 
 from kemba.cache import Recent
 from kemba.instructions import replay
+from kemba.ocp.functions.signs import canonical_signs
 from kemba.settings import Settings, setting
 
 FEW = 8  # points at which evaluating one by one is as fast as all at once
@@ -102,7 +103,8 @@ def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, shared: bool) -> Code:
     """The code of cost f and rows g of z and parameters p.
 
     Where it is `shared`, constants become parameters, so that blocks which differ in numbers are
-    equal; the code of an equal block is used again.
+    equal, and parts that differ only in sign are written once; the code of an equal block is used
+    again.
     """
     g = ca.densify(g)
     if not shared:
@@ -113,6 +115,7 @@ def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, shared: bool) -> Code:
 
 def _rewritten(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX) -> Code:
     (f, g), constants, numbers = parameterised([z, p], [f, g])
+    f, g = canonical_signs([z, p, constants], [f, g])
     return Code(z, ca.vertcat(p, constants), f, g, numbers)
 
 
