@@ -89,7 +89,7 @@ CONSTANTS = {  # file -> names, why
     "ocp/task/requirement.py": ("SCALES ROUND", "units; rounding"),
     "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
     # tuning numbers that are to become settings
-    "learn/round.py": ("SUPPLY", "of a model that names none"),
+    "rounds/round.py": ("SUPPLY", "of a model that names none"),
     "identify/robot/physics.py": ("FOLDED", "how far a knee folds at most"),
     "identify/rigs/rig_log.py": ("GAIN", "a Gaussian's cut"),
     "events.py": ("PLANNED", "what the solver's tolerance leaves of a closed gap"),
@@ -102,7 +102,7 @@ CONSTANTS = {  # file -> names, why
         "LOOSE ALIKE FAR ROUNDS BLOCKS DISAGREE TELLS OF_A_RUN",
         "as good as none; one; three sigmas; counts; a p-value",
     ),
-    "learn/correction.py": ("TURNED", "beyond any other error"),
+    "rounds/correction.py": ("TURNED", "beyond any other error"),
     "identify/workflow.py": ("QUOTED AROUND", "logs of which one is kept aside; of a speed"),
     "identify/infer/selection.py": ("ANY STRONG SAME", "evidence; rounding of a fit"),
     "model/evidence.py": ("ROUNDING WIDER", "rounding; noise of a span's ends"),
