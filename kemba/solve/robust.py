@@ -149,7 +149,7 @@ class _Search:
 
     def _executed(self, one: RobustCandidate, until: int) -> RobustCandidate:
         """A candidate that is executed in the scenarios up to `until`."""
-        plan, done = one.plan, tuple(one.done)
+        plan, done, until = one.plan, tuple(one.done), min(until, len(self.cases))
         while one.table is not None and len(done) < until and time.monotonic() < self.deadline:
             left = self.cases[len(done) : min(until, len(done) + FEW)]
             done += tuple(outcomes(plan.model, plan.trajectory, one.table, left))
