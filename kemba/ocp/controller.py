@@ -22,8 +22,8 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     valve if that is longer; until then the first pose is held, valves closed. Hip angles and rates
     are the plan's at the tick, because the controller compares them with what it measures there.
     The torque is the mean of the plan over the tick, so that the angular impulse is the plan's.
-    Valves are exactly 0 or 1, sent their dead time early, and their edges are rounded to ticks all
-    together: see `kemba.ocp.edges`.
+    Valves are exactly 0 or 1, sent their dead time early, and their edges are rounded to ticks: see
+    `kemba.ocp.edges`.
     """
     dead = max(max(model.timing(leg)) for leg in model.mechanism.legs)
     lead = int(np.ceil(max(dead, hold) / PERIOD - 1e-9))

@@ -1,4 +1,4 @@
-"""One loop that solves: starts, each trial executed, judged and scored.
+"""One loop that solves: starts x repairs, each trial executed, judged and scored.
 
 Imported when first asked for: who only reviews logs needs no optimiser.
 """

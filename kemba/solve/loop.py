@@ -1,9 +1,10 @@
-"""The plan that `solve` gives: starts, each planned and executed, until one is good.
+"""The plan that `solve` gives: starts, each planned, executed and repaired, until one is good.
 
 for each start:                     an earlier plan, one guess after the other
     plan from it                    kemba.ocp.planning
-    execute and judge               kemba.solve.trial
-    stop if the trial is good
+    for each repair:                nothing, edges on ticks
+        execute and judge           kemba.solve.trial
+    stop if the best trial is good
 give the trial of the best score
 """
 
@@ -22,6 +23,7 @@ from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent
 from kemba.ocp.starts import plan_best
 from kemba.solve.listener import Listener
+from kemba.solve.repairs import repaired
 from kemba.solve.trial import Begun, Trial, TrialOrder, executed
 from kemba.trajectory import Trajectory
 
@@ -89,9 +91,11 @@ def best_plan(
     planning = _planning(task, document, approach, listener, deadline)
     best = last = None
     for one in _candidates(planning, approach, listener, deadline):
-        last = executed(one.plan, execution, one.table, one.share)
-        best = last if best is None or last.score > best.score else best
-        if best.good:
+        first = executed(one.plan, execution, one.table, one.share)
+        trials = repaired(first, planning, execution) if approach.replay else iter((first,))
+        for last in trials:
+            best = last if best is None or last.score > best.score else best
+        if best is not None and best.good:
             break
     assert best is not None and last is not None
     if one.share is not None and best.plan is not one.plan:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from kemba.scenarios.share import Share
 
 Begun = Callable[[Trajectory], None]
+WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
 @dataclass(frozen=True)
@@ -46,22 +47,23 @@ class Motions:
 @dataclass(frozen=True)
 class Trial:
     """A plan, its entries in the JSON with those of its executions, what is written, and how the
-    executions were judged where there were any."""
+    executions were judged where there were any. `repair`: by what it comes of the trial before."""
 
     plan: Plan
     result: dict[str, Any]
     motions: Motions
     judged: Judged | None = None
+    repair: str = ""
 
     def __str__(self) -> str:
-        """One line: where it began, how good it is."""
+        """One line: where it began, what was repaired, how good it is."""
         cost = objective(
             self.plan.model, self.plan.task, self.plan.requirements, self.plan.trajectory
         )
-        parts = [self.plan.start, str(self.result["status"]), f"cost {cost:.4g}"]
+        parts = [self.plan.start, self.repair, str(self.result["status"]), f"cost {cost:.4g}"]
         if self.misses:
             parts.append(f"misses {self.misses:.2g} of what is allowed")
-        return ", ".join(parts)
+        return ", ".join(part for part in parts if part)
 
     @property
     def good(self) -> bool:
@@ -69,9 +71,29 @@ class Trial:
         return bool(self.result["good"])
 
     @property
+    def table_misses(self) -> bool:
+        """Whether of its own model's executions only that of the table misses."""
+        return (
+            self.judged is not None
+            and self.judged.verdicts["replay"].good
+            and not self.judged.replays
+        )
+
+    @property
     def misses(self) -> float:
-        """The largest error in units of what is allowed; 0 where the plan is good."""
-        return 0.0 if self.judged is None or self.good else self.judged.share
+        """The largest error in units of what is allowed; 0 where the plan is good and its table
+        well within that."""
+        if self.judged is None:
+            return 0.0
+        if not self.good:
+            return self.judged.share
+        table = self.judged.verdicts["table_replay"].share
+        return table if table > WELL else 0.0
+
+    @property
+    def fine(self) -> bool:
+        """Whether nothing is left to be improved."""
+        return self.good and self.misses == 0.0
 
     @property
     def score(self) -> tuple[bool, bool, bool, float, float]:
@@ -88,6 +110,7 @@ def executed(
     execution: TrialOrder,
     table: Trajectory | None = None,
     share: Share | None = None,
+    repair: str = "",
 ) -> Trial:
     """A plan with its table and, if asked for, its executions."""
     result = answer(found, execution.place)
@@ -96,7 +119,7 @@ def executed(
     if table is not None:
         execution.begun(found.trajectory)
     if table is None or not execution.replay or not found.status.plan:
-        return Trial(found, result, Motions(table))
+        return Trial(found, result, Motions(table), repair=repair)
     wait_for_compiler(execution.tell)
     execution.tell("replay: the times of controller.csv")
     known = None
@@ -114,7 +137,7 @@ def executed(
         result |= {"robust": share.summary()}
         result["sentence"] += f"; {share.sentence}"
     motions = Motions(table, done.motion if done else None)
-    return Trial(found, result, motions, done)
+    return Trial(found, result, motions, done, repair)
 
 
 def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:

@@ -148,7 +148,9 @@ def test_of_plans_that_fail_the_nearest_is_best(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("kemba.solve.trial.objective", lambda *parts: 1.0)
     far, near = run(7.6, 0.1, False), run(1.7, 0.1, False)
     assert near.score > far.score
-    assert run(0.9, 0.8, True).score > near.score
+    good, exact = run(0.9, 0.8, True), run(0.9, 0.1, True)
+    assert good.score > near.score and exact.score > good.score
+    assert exact.fine and not good.fine
 
 
 def test_tolerances_are_the_tasks() -> None:

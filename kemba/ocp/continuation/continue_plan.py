@@ -24,6 +24,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
+from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
 from kemba.ocp.refinement.solve import solve, warm
@@ -101,6 +102,8 @@ class Continuation:
                 found = self._solved(mesh, reduction)
                 if found.ending.cut_short or self._is_kept(found):
                     return found
+                if self.origin.ticks:
+                    break
             if self.origin.once:
                 return Refined(None, None, Ending.GAVE_UP, 0)
             return self._read_anew(start)
@@ -151,6 +154,8 @@ class Continuation:
         program, x = refiner.build(mesh.phases, mesh.start, RADAU5)
         kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
         x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
+        if self.origin.ticks:
+            on_ticks(program, x)
         begin = Iterate(x)
         if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
             begin = mesh.stages.iterate(program, x)

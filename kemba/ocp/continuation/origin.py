@@ -24,8 +24,10 @@ class Origin:
     """An earlier plan, the model it was made with, and what was asked of it.
 
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
-    where the earlier phases do not fit, they are not read anew. `stages`: the solved program of the
-    plan, where it is at hand. `run`: its folder; `given`: whether the user named it.
+    where the earlier phases do not fit, they are not read anew. `ticks`: valve edges of the new
+    plan are on the controller's ticks; where that fails at once, these ticks do not fit, and
+    nothing else is tried. `stages`: the solved program of the plan, where it is at hand. `run`: its
+    folder; `given`: whether the user named it.
     """
 
     plan: Trajectory
@@ -34,6 +36,7 @@ class Origin:
     name: str = "the earlier plan"
     dear: str = "one without --from may take less"
     once: bool = False
+    ticks: bool = False
     stages: Stages | None = None
     run: str = ""
     given: bool = True

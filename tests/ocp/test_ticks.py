@@ -1,0 +1,60 @@
+"""Valve edges of a plan on the controller's ticks: its table then is the plan."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kemba.model import Model, load_model
+from kemba.ocp.continuation.origin import Origin
+from kemba.ocp.controller import PERIOD
+from kemba.ocp.phases.modes import Phase
+from kemba.ocp.phases.ticks import edge_times
+from kemba.ocp.planned import Plan
+from kemba.ocp.planning import Planning
+from kemba.ocp.reading import load_task
+from kemba.ocp.transcription.symmetry import find_symmetry, whole
+
+
+def off_ticks(model: Model, plan: Plan) -> float:
+    """How far [s] the worst edge of a plan is from a tick, its dead time taken off."""
+    worst = 0.0
+    for leg in model.mechanism.legs:
+        on, off = model.timing(leg)
+        for chamber in ("extend", "retract"):
+            value = plan.trajectory[f"{leg}/valve/{chamber}"][1:]
+            k = np.flatnonzero(np.diff(value, prepend=0.0))
+            k = k[k > 0]  # the plan begins at 0, whatever the dead time
+            sent = plan.trajectory.time[k] - np.where(value[k] > 0.5, on, off)
+            ticks = sent / PERIOD
+            worst = max(worst, PERIOD * float(np.abs(ticks - np.round(ticks)).max(initial=0.0)))
+    return worst
+
+
+def test_a_plan_on_ticks_has_its_edges_there() -> None:
+    task, document = load_task("jump.yaml", ["height=0.54 m"])
+    planning = Planning.of(task, document)
+    old = next(planning.plans())
+    known = (old.trajectory, old.model, old.requirements)
+    origin = Origin(*known, once=True, ticks=True, stages=old.stages)
+    new, why = planning.continued(origin)
+    assert new is not None, why
+    assert off_ticks(old.model, old) > 1e-4
+    assert off_ticks(new.model, new) < 1e-8
+    cost = [plan.cost["torque_squared_integral"] for plan in (old, new)]
+    assert cost[1] == pytest.approx(cost[0], rel=0.05)
+
+
+@pytest.mark.parametrize("half", [True, False])
+def test_edges_are_near_and_in_order(half: bool) -> None:
+    model = load_model("planning")
+    reduction = find_symmetry(model) if half else whole(model.node)
+    assert reduction is not None
+    legs = 1 if half else 2
+    patterns = [(1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (1.0, 0.0)]
+    phases = [Phase(i, i + 1, (), pattern * legs) for i, pattern in enumerate(patterns)]
+    borders = np.array([0.0, 0.1234, 0.1567, 0.1999])
+    found = edge_times(model, reduction, phases, borders)
+    assert list(found) == [1, 2, 3]
+    times = np.array(list(found.values()))
+    assert np.all(np.diff(times) > 0) and np.abs(times - borders[1:]).max() < PERIOD
