@@ -3,14 +3,16 @@
 
     python benchmarks/ablation.py --study bench --cases 40
     python benchmarks/ablation.py --study bench --cases 40 --without "swaps,secants"
+    python benchmarks/ablation.py --study bench --cases 100:120 --recorded
     python benchmarks/ablation.py --report [--write]
 
 A rule is a function of the search, of the doubts or of the verdict that is replaced from outside
 by one that does nothing; the program itself has no switches. Each case is answered as it is, which
 rules acted is noted, and it is answered again without each of these. `--without`: without several
-rules at once. Predictions are kept within a case, so that an answer costs only what differs. No
-answer has a time limit. Results are kept in benchmarks/ablation.jsonl: an interrupted study goes on
-where it stopped.
+rules at once. `--recorded`: cases are answered by the program as it is, beside their recorded
+answers, which the program with all of its former rules gave. Predictions are kept within a case, so
+that an answer costs only what differs. No answer has a time limit. Results are kept in
+benchmarks/ablation.jsonl: an interrupted study goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -47,6 +49,7 @@ from kemba.identify.robot.problem import RobotProblem
 STUDIES = {"bench": bench, "robot": robot, "second": second}
 RECORDS = ROOT / "benchmarks" / "ablation.jsonl"
 HOME = "kemba.identify."
+GONE = "all that are gone"  # rules that the program has no more
 
 
 @dataclass(frozen=True)
@@ -297,6 +300,12 @@ def answered(problem: Any, setting: Record, truth: Any) -> Record:
         traceback.print_exc()
         return {"failed": True}
     record = {"case": setting, "truth": truth, "answer": answer}
+    return in_short(record, time.process_time() - started)
+
+
+def in_short(record: Record, seconds: float) -> Record:
+    """What a record of a blind study says of its case."""
+    answer = record["answer"]
     nothing, outside = not hidden(record), kind(record) == "outside"
     first = report.among_first(record, 1)
     if nothing or outside:
@@ -312,8 +321,26 @@ def answered(problem: Any, setting: Record, truth: Any) -> Record:
         "sure_wrong": bool(report.sure_and_wrong(record)),
         "p": answer["p_value_nothing"],
         "errors": [answer["error_before"], answer["error_after"]],
-        "seconds": round(time.process_time() - started, 1),
+        "seconds": round(seconds, 1),
     }
+
+
+def beside_recorded(study: str, index: int, setting: Record, out: Path) -> None:
+    """One case as it is, beside the recorded answer of the same case, where there is one."""
+    if any((r["study"], r["index"]) == (study, index) for r in report.read(out)):
+        return
+    known = report.read(ROOT / "benchmarks" / "blind" / f"{study}.jsonl")
+    old = next((r for r in known if r.get("case") == setting and "left_out" not in r), None)
+    if old is None:
+        return
+    truth, make = STUDIES[study].prepared(setting)
+    problem = make()
+    with remembered():
+        new = answered(problem, setting, truth)
+    told = {"": {**in_short(old, old["seconds"]), "acted": []}, GONE: new}
+    for name, found in told.items():
+        report.append(out, {"study": study, "index": index, "without": name, **found})
+        print(f"{study} {index} {name or 'recorded'}: {found.get('verdict')}", flush=True)
 
 
 def run(study: str, index: int, setting: Record, groups: list[str], out: Path) -> None:
@@ -358,6 +385,7 @@ def main() -> None:
     parser.add_argument("--study", choices=STUDIES, default="bench")
     parser.add_argument("--cases", default="40", help="so many of the beginning, or begin:end")
     parser.add_argument("--without", action="append", default=[], help="rules, by commas")
+    parser.add_argument("--recorded", action="store_true", help="beside the recorded answers")
     parser.add_argument("--seconds", type=float, help="length of bench logs, other than recorded")
     parser.add_argument("--out", type=Path, default=RECORDS)
     parser.add_argument("--report", action="store_true", help="run nothing, only tell the results")
@@ -371,7 +399,10 @@ def main() -> None:
         for index, setting in cases:
             if options.seconds and "duration" in setting:
                 setting["duration"] = options.seconds
-            run(options.study, index, setting, options.without, options.out)
+            if options.recorded:
+                beside_recorded(options.study, index, setting, options.out)
+            else:
+                run(options.study, index, setting, options.without, options.out)
     found = table(report.read(options.out))
     print(found)
     if options.write:
