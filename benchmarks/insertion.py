@@ -23,7 +23,6 @@ from kemba.ocp.certificate.objective import objective
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement.insertion import FAILS
 
-MOTIONS = Path(__file__).with_name("motions")
 TASKS = (
     *(("jump.yaml", f"height={h} m") for h in (0.43, 0.5, 0.6, 0.7, 0.8)),
     ("jump.yaml", "height=0.71 m", "supply=0.66 MPa"),

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from kemba.config import shipped_configs
 from kemba.errors import KembaError
 from kemba.ocp.planning import check_feasible
 from kemba.ocp.reading import load_task
 
-MOTIONS = Path(__file__).parents[2] / "benchmarks" / "motions"
-SHIPPED = MOTIONS.joinpath("hurdle.yaml").read_text(encoding="utf-8")
+SHIPPED = shipped_configs("tasks")["hurdle.yaml"].read_text(encoding="utf-8")
 KEPT, _, REST = SHIPPED.partition("obstacles:\n")
 AFTER = REST[REST.index("\ncontacts:") :]
 NUMBER = KEPT.count("\n") + 1  # of the line with `obstacles:` or `terrain:`
@@ -57,6 +57,6 @@ def test_a_wrong_scene_is_refused_at_its_line(
 
 def test_motions_over_terrain_can_be_asked() -> None:
     for name in ("platform.yaml", "drop_off.yaml", "hurdle.yaml"):
-        model, requirements = check_feasible(*load_task(MOTIONS / name))
+        model, requirements = check_feasible(*load_task(name))
         assert not model.mechanism.scene.even
         assert any(r.quantity.name.endswith("foot/gap") for r in requirements)
