@@ -15,8 +15,6 @@ that an answer costs only what differs. No answer has a time limit. Results are 
 benchmarks/ablation.jsonl: an interrupted study goes on where it stopped.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

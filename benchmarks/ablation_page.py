@@ -1,7 +1,5 @@
 """The table of benchmarks/ablation.py: paired differences without each rule."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path

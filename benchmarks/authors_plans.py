@@ -8,8 +8,6 @@ of the squared hip torques. Theirs are read from the plans that they publish
 (github.com/chrismailer/kemba-trajectory-optimisation).
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The part of a page that a benchmark writes."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Callable, Iterable
 from pathlib import Path

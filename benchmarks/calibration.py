@@ -24,8 +24,6 @@ since an answer beyond a level is `nothing`.
 Records are added to benchmarks/program.json; benchmarks/program_page.py writes its page from them.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -6,8 +6,6 @@ of its size that the spike allows. The machine here is the twin of tests/twin: o
 linearised.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

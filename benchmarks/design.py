@@ -8,8 +8,6 @@ its rival are fitted to that log, as an answer would have them. `experiment` des
 the twin does it, and the evidence between both is measured. Finished cases are kept in the file.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -11,8 +11,6 @@ benchmarks/program.json, from which benchmarks/program_page.py writes its page. 
 something was lost or mixed up.
 """
 
-from __future__ import annotations
-
 import argparse
 import random
 import signal

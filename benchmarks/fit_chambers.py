@@ -8,8 +8,6 @@ II; both are read off the bench rig of the model itself. Prints the fitted figur
 entry, what the tables say and what the model gives.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 from scipy.integrate import solve_ivp

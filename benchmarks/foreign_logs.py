@@ -4,8 +4,6 @@ python benchmarks/foreign_logs.py [COUNT] [FIRST SEED]: a table on the standard 
 full. Exit code 1 where a log was read wrong or crashed.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections import Counter

@@ -13,8 +13,6 @@ noise, figures found, CPU seconds, and what `compare` says of the kept logs unde
 model, the plant's own and the model that was written.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import tempfile

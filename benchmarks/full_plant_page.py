@@ -1,7 +1,5 @@
 """The table of benchmarks/full_plant.py: what was found in logs of the full plant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -11,8 +11,6 @@ from which benchmarks/program_page.py writes its page. Exit code 1 when an input
 Needs the test dependencies: pip install '.[test]'.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import sys

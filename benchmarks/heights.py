@@ -8,8 +8,6 @@
 A run is kept in the folder; delete it to plan it anew.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

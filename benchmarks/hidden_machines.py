@@ -4,8 +4,6 @@
 The twin (tests/twin) has its own equations, contacts (springs), integration and sensors.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ Each task is planned from its first guess twice, as it is and without pulses: co
 own weights, phases, CPU seconds.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Iterator

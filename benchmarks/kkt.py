@@ -7,8 +7,6 @@ The matrix is IPOPT's for the whole robot's program at the start guess: Hessian 
 slacks of inequalities, rows. Ordered node after node it is banded, and block tridiagonal.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

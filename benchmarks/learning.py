@@ -7,8 +7,6 @@ parameters at once. Every finished way of a machine is kept in the record; an in
 goes on, `--part 1/2` with every second machine. `--page` only writes the section of docs/learn.md.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -1,7 +1,5 @@
 """The section of docs/learn.md from the record of benchmarks/learning.py."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

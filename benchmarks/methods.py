@@ -6,8 +6,6 @@ Prints one row per method: how it ended, time, size, cost as a time integral, wh
 and how often valves switch. All methods start from the same automatic guess on the same grid.
 """
 
-from __future__ import annotations
-
 import argparse
 
 import numpy as np

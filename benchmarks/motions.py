@@ -4,8 +4,6 @@ Without arguments the shipped motions beside the jumps. Everything from a guess 
 each: how far it came, cost, CPU seconds of the solves, and the sentence of `solve`.
 """
 
-from __future__ import annotations
-
 import sys
 
 from kemba.config import shipped_configs

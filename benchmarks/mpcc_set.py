@@ -9,8 +9,6 @@ the others are normal around it with a standard deviation of 1. `--branches` sol
 programs of a problem with n pairs, which gives the best value where these are convex.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import time

@@ -11,8 +11,6 @@ changed, and the score with its 95 % Wilson interval. Exit code 1 when a bug sur
 apply. Needs the test dependencies: pip install '.[test]'.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

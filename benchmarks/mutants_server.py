@@ -6,8 +6,6 @@ that failed. Nothing of the project itself is loaded before the fork, so that ea
 files as they are then. A new process for every run would spend most of its time on imports.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import json

@@ -10,8 +10,6 @@ them from the larger half; those of `TUNED`, on which figures were chosen, are l
 The set states no licence: it is run, and not kept here.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -6,8 +6,6 @@ Each task is planned as `solve` plans it, without memory: CPU seconds of plan, t
 executions, and whether the plan is good.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Iterator

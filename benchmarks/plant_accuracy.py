@@ -7,8 +7,6 @@ the feet kept under the hips; first on the planning model, then on the full plan
 per step size.
 """
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

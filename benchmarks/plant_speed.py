@@ -7,8 +7,6 @@ plant, with steps that the motion chooses and with equal ones. `BEFORE` is what 
 CasADi's virtual machine and NumPy at 100 us; the ratio holds on the machine named there only.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess

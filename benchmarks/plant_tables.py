@@ -7,8 +7,6 @@ test, beside the paper's values. MODEL is `plant` unless given. `--figures docs/
 rig as the paper's Fig. 3, 4, 6 and 7 do, with the fitted model in the last.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

@@ -6,8 +6,6 @@ Prints a table, one line per task; `--save` puts it between the marks in the pag
 `kemba-opt solve TASK` as anyone runs it.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

@@ -6,8 +6,6 @@ the pressure of the undisturbed execution by short pulses, within 20 kPa and wit
 the open-loop table. Prints a table for docs/policy.md; the package itself measures no pressures.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

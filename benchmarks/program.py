@@ -3,8 +3,6 @@
 Beside them stand the commits of the code that was tried: `code`, by study and part.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import tempfile

@@ -7,8 +7,6 @@ mutants.py) and
 benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from statistics import median

@@ -10,8 +10,6 @@ one known is the cheapest refined plan, whether or not the plant keeps to it. Re
 benchmarks/quality.jsonl; an interrupted study goes on after the last.
 """
 
-from __future__ import annotations
-
 import argparse
 import itertools
 import json

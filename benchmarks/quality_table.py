@@ -1,7 +1,5 @@
 """The table of benchmarks/quality.py from its record."""
 
-from __future__ import annotations
-
 import json
 from collections import defaultdict
 from pathlib import Path

@@ -7,8 +7,6 @@ by the format's library, another one by kemba; the least CPU time of several rep
 much the process grew at most, are printed as a table. Linux only: it tells the largest size.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

@@ -10,8 +10,6 @@ fit of all effects leaves, and once from what a fit to the other blocks leaves. 
 white noise. Means over effects and logs are put into benchmarks/program.json.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -3,8 +3,6 @@
 One line per case; with arguments one case only: python benchmarks/refine.py jump "height=0.8 m".
 """
 
-from __future__ import annotations
-
 import platform
 import sys
 import time

@@ -4,8 +4,6 @@ kemba-opt sweep reliability.yaml --jobs 2
 python benchmarks/reliability.py sweeps/reliability
 """
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Iterator
 from pathlib import Path

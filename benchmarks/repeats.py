@@ -5,8 +5,6 @@
 The paper's robot missed the height of its 0.5 m jump by 3 cm at most.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 from collections.abc import Sequence

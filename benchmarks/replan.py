@@ -7,8 +7,6 @@ Both ways in turns in one process, which has made such a plan before; CPU second
 its executions as well.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

@@ -9,8 +9,6 @@ compared with the columns of trajectory.csv, read by nothing but the csv module.
 silent where the answer is `solved`, but the file does not keep it.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import json

@@ -5,8 +5,6 @@ as rounded and as written, in units of what needs no search: 0.5 mm of apex, 1 m
 1 cm of the end.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from typing import Any

@@ -6,8 +6,6 @@ Plans the shipped jump, executes it three times on the plant with noisy sensors,
 planning model lacks, and photographs the page: wide, and as wide as a phone.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import shutil

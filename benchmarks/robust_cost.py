@@ -4,8 +4,6 @@ Every task is planned by the whole command, plain and then robust, each in a pro
 CPU seconds count the process and its children. Run it on a machine that does nothing else.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import resource

@@ -7,8 +7,6 @@ interrupted run continues. A task may carry changes: "jump height=0.6 m, supply=
 benchmarks/pages/robustness.md, is written from the record.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

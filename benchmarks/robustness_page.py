@@ -1,7 +1,5 @@
 """benchmarks/pages/robustness.md from the record that benchmarks/robustness.py keeps."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence

@@ -7,8 +7,6 @@ times the median the longest one took, and the exponent p of time ~ N^p. Aims: p
 no solve above 3 times the median. `--refine none` measures plans of implicit Euler.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Sequence

@@ -12,8 +12,6 @@ they were run: an interrupted study goes on where it stopped, and the page says 
 are. Later lines replace earlier ones. Parts of a study may run at the same time.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import importlib

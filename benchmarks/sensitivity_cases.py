@@ -1,7 +1,5 @@
 """Cases of the sensitivity study: stages that are run again from where a setting is read."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """The page of the sensitivity study: one line per threshold, made from its records."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections import defaultdict

@@ -8,8 +8,6 @@ the figures of a page. Run it on a quiet machine. Tasks may be followed by overr
 `jump.yaml,nodes=200`.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import platform

@@ -7,8 +7,6 @@ seconds at most, and the solver's own options, but for its output. `--save` repl
 the page.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import resource

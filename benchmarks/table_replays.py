@@ -5,8 +5,6 @@ eq. 10 and the dead time. *Before landing* is the largest distance between plann
 centre of the body until the first of both touches down, or over the whole plan where none does.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 from collections.abc import Iterator, Sequence

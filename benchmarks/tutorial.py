@@ -6,8 +6,6 @@ Commands that have run in FOLDER are not run again, so an interrupted run goes o
 With machines named, only their commands run, and the rest of the page stays as it is.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

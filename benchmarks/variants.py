@@ -7,8 +7,6 @@ IPOPT shifted the Hessian and so factorised more than once, the cost (geometric)
 time as a ratio to what is shipped.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import tempfile

@@ -8,8 +8,6 @@ once. Every command is a process of its own, figures included; on a machine with
 Each case is asked three times: the median is told, in brackets the least and the greatest time.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -7,8 +7,6 @@ CPU seconds count this process and the one that draws the figure; they depend li
 the machine does.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import json

@@ -1,7 +1,5 @@
 """Exit codes and messages of failures, the same for every verb."""
 
-from __future__ import annotations
-
 import errno
 import functools
 import os

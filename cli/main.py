@@ -4,8 +4,6 @@ Verb modules import typer only; numpy, casadi and the like belong inside their f
 `--help` answers at once.
 """
 
-from __future__ import annotations
-
 import gc
 import os
 import sys

@@ -1,7 +1,5 @@
 """Usage: examples beside complaints, and forms of options that scripts still write."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

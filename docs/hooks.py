@@ -1,7 +1,5 @@
 """Pages that are made when the site is built, and the way onwards from those that scripts write."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

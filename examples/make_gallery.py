@@ -1,7 +1,5 @@
 """Run all examples and write the gallery: `python examples/make_gallery.py [NAME ...]`."""
 
-from __future__ import annotations
-
 import ast
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Where the examples put their pictures: `pictures/` here, or the folder KEMBA_PICTURES."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

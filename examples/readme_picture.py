@@ -5,8 +5,6 @@
 It plans the shipped jump, or takes a run folder, and writes docs/images/jump.gif.
 """
 
-from __future__ import annotations
-
 import io
 import os
 import sys

@@ -1,8 +1,6 @@
 """What is kept: compiled code on this machine, where nobody else could have written it, and what
 a process made lately."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections import OrderedDict

@@ -1,7 +1,5 @@
 """Writing files whole or not at all, and JSON."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

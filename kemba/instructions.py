@@ -1,7 +1,5 @@
 """The instructions of a CasADi function, applied to other things than numbers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 

@@ -8,8 +8,6 @@ Every function also comes as a loop over rows. Where the output of one row is an
 as with steps in time, it is written there.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -4,8 +4,6 @@ The matrices here are small. OpenBLAS splits them all the same, and its threads 
 by spinning: beside another process that costs many times the work itself.
 """
 
-from __future__ import annotations
-
 import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

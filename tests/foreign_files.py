@@ -1,7 +1,5 @@
 """One robot log as five other programs would write it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A jump without hold, clearance or a bound on impacts: quick to plan, whatever is shipped."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 TASK = """\

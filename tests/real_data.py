@@ -1,7 +1,5 @@
 """Data of others, read from the folder KEMBA_DATA; without it a test is skipped and says so."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tests of a rig done on the independent twin, and what their logs say between two rivals."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import islice
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Short hops of the blind twin as logs: quick to make, with every phase in them."""
 
-from __future__ import annotations
-
 import numpy as np
 from twin import cases, figures, measure, run, scripts
 

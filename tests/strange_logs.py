@@ -4,8 +4,6 @@
 map makes of it.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What continuous integration runs: its parts, its closing line, the list of bugs on purpose."""
 
-from __future__ import annotations
-
 import ast
 import runpy
 import subprocess

@@ -1,7 +1,5 @@
 """The documents name what is there: keys of tasks, files of equations, shipped tasks."""
 
-from __future__ import annotations
-
 import pkgutil
 import re
 import runpy

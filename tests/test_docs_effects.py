@@ -1,7 +1,5 @@
 """The pages about effects: their code runs, their tables are those of the code."""
 
-from __future__ import annotations
-
 import re
 import runpy
 from pathlib import Path

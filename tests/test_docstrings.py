@@ -1,7 +1,5 @@
 """Docstrings: functions of arrays give shapes, those that raise say what."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

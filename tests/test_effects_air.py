@@ -1,7 +1,5 @@
 """Air effects against their equations, worked out by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

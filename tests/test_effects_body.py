@@ -1,7 +1,5 @@
 """Body, hip and ground effects against independent mechanics."""
 
-from __future__ import annotations
-
 import math
 
 import casadi as ca

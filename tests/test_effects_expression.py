@@ -1,7 +1,5 @@
 """Formulas of the user's own: parsed without eval, checked for their dimension."""
 
-from __future__ import annotations
-
 import ast
 import time
 from typing import Any

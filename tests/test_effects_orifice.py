@@ -1,7 +1,5 @@
 """Physical chambers: what eq. 1 to 3 conserve, and the paper's tables through the rig."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

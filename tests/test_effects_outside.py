@@ -1,7 +1,5 @@
 """Effects from outside the package: the page's example, packages, processes, and mistakes."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

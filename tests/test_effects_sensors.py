@@ -1,7 +1,5 @@
 """Sensor effects: in what is measured, never in the motion."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

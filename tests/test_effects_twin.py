@@ -1,7 +1,5 @@
 """The same effect in other code makes the same motion: the catalogue against the blind twin."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

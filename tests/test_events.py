@@ -1,7 +1,5 @@
 """Motions as events: synthetic bounds, flips and jumps, and what differs from them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """The examples run, and the gallery shows them as they are."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

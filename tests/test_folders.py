@@ -1,7 +1,5 @@
 """Results are kept: one writer at a time, nothing overwritten, and full disks told in words."""
 
-from __future__ import annotations
-
 import errno
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Expressions as machine code give what CasADi's own machine gives, also row by row."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

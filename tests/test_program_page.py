@@ -1,7 +1,5 @@
 """The page on the program's own reliability names tests that are there."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from kemba.config import load_yaml

@@ -1,7 +1,5 @@
 """What small changes do: by one linear system, against plans solved again and against replays."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

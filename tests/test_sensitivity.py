@@ -1,7 +1,5 @@
 """The sensitivity study runs again what reads a setting, and nothing else."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Settings say what they are, and can be changed for a while."""
 
-from __future__ import annotations
-
 import pytest
 
 from kemba.errors import KembaError

@@ -1,8 +1,6 @@
 # ruff: noqa: E402  (benchmarks are no package)
 """Pages of the studies of landing and of learning say what their records hold."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

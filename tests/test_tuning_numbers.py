@@ -1,7 +1,5 @@
 """Numbers that users set are settings with unit, meaning and origin; others have a comment."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import importlib

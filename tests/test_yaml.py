@@ -1,7 +1,5 @@
 """YAML as kemba reads and writes it: YAML 1.2, within limits, no code."""
 
-from __future__ import annotations
-
 import math
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A problem small enough to know the answer: effects on a line, exactly linear, white noise."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

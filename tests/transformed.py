@@ -1,7 +1,5 @@
 """Logs written in another way that says the same: units, order, clock, rate, side, pieces."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 

@@ -10,8 +10,6 @@ chamber pressures. The cases come in an order of which any beginning is a fair s
 the file are not run again, so an interrupted study goes on where it stopped.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

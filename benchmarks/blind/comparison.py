@@ -1,7 +1,5 @@
 """Kemba and other methods on the same cases, counted alike."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from blind.kinds import Record, hidden, kind, named

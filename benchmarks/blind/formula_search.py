@@ -9,8 +9,6 @@ given every run but the last, 400 rows in all, and judged on the last. What kemb
 cases is read from bench.jsonl.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import os

@@ -1,7 +1,5 @@
 """What was hidden in a case, what was named, and of which kind the case is."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -15,8 +15,6 @@ valves move past readings: there every fit is sought anew, with slopes of each o
 from the hidden effect as it is, which `discover` cannot know. Logs that were refused are left out.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import os

@@ -1,7 +1,5 @@
 """Scores of a blind study: what was right, what was claimed wrongly, and how surely."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence

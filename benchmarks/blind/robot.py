@@ -9,8 +9,6 @@ seeds drawn. The kinds are spread evenly, so that any beginning of the list is a
 Finished cases are kept in the file: an interrupted study goes on where it stopped.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -10,8 +10,6 @@ ground, loops and boom give way by less than the noise. A quarter of the cases h
 The kinds are spread evenly; finished cases are kept in the file.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

@@ -1,7 +1,5 @@
 """Running a blind study: cases in a fair order, resumed from a file, reported into the docs."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

@@ -5,8 +5,6 @@ past readings, or nominal figures are far off, these hold nearby only: hypothese
 hundreds of nats above what they can reach, and slopes promise what is not there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ways to solve a program with pairs, all by kemba's wrapper of IPOPT and MUMPS."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The methods that benchmarks/nosbench.py compares, by the same functions of the same programs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The schedule of the plans, as benchmarks/nosbench.py compares it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

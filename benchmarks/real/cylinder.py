@@ -1,7 +1,5 @@
 """Two seals of a pneumatic cylinder: which friction, how large."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from benchmarks.real import data

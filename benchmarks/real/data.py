@@ -4,8 +4,6 @@ The folder is named by KEMBA_DATA. Files are checked against their SHA-256. `fet
 has an address; what was digitised or converted has none and must be put into the folder by hand.
 """
 
-from __future__ import annotations
-
 import os
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The EMPS drive: from inertia alone to friction that differs by direction."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from benchmarks.real import data

@@ -4,8 +4,6 @@ KEMBA_DATA=folder python -m benchmarks.real.page            ten minutes of CPU t
 python -m benchmarks.real.page --download                   into the cache of the user
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

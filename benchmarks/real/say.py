@@ -1,7 +1,5 @@
 """What the tool says of logs, as lines of Markdown."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 

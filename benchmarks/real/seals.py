@@ -8,8 +8,6 @@ which it slides for sure, of the model as it is, of `answer/model.yaml`, of `cha
 plain least squares on such rows.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """A vessel that blows down: is the heat of the wall named?"""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`kemba-opt adopt`: the model of what an answer found, or of another effect of its ranking."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`kemba-opt check`: validate YAML files and logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

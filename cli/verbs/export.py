@@ -1,7 +1,5 @@
 """`kemba-opt export`: trajectories in other formats, and programs for other solvers."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`kemba-opt learn`: one round from executed runs to the next run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

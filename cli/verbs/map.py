@@ -1,7 +1,5 @@
 """`kemba-opt map`: draft a column map for a log of another program."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`kemba-opt plot`: figures and animations of plans, simulations and logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`kemba-opt review`: plan, simulated robot and logs on one page, with a verdict."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

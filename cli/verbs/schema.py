@@ -1,7 +1,5 @@
 """`kemba-opt schema`: JSON Schemas for editors."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

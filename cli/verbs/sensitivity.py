@@ -1,7 +1,5 @@
 """`kemba-opt sensitivity`: what 10 kPa or 100 g do to a plan."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

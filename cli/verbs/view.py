@@ -1,7 +1,5 @@
 """`kemba-opt view`: a motion in 3-D."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

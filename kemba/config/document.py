@@ -1,7 +1,5 @@
 """YAML documents with the line and column of every part."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """An effect switched on, placed in a model that suits it, and points at which to evaluate it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The one list of checks, and running them."""
 
-from __future__ import annotations
-
 import json
 import math
 import traceback

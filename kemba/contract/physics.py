@@ -1,7 +1,5 @@
 """Promises about an effect's numbers: finite, off is absent, friction takes energy away."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.contract.cases import (

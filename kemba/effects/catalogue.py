@@ -1,7 +1,5 @@
 """The effects that kemba ships, by family, and the register of all effects by kind."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from types import ModuleType
 

@@ -1,7 +1,5 @@
 """The catalogue as data and as a page: what each effect is, from its own definition."""
 
-from __future__ import annotations
-
 import inspect
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The dimension of every part of a formula: a force is no length, and `tanh` takes a number."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Mapping
 from dataclasses import dataclass

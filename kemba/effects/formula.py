@@ -4,8 +4,6 @@ Nothing is ever handed to Python's `eval`. The syntax tree is walked, and every 
 arithmetic on known names is refused. Constants such as `2*9.81` are computed once, as floats.
 """
 
-from __future__ import annotations
-
 import ast
 import itertools
 import math

@@ -4,8 +4,6 @@ Such code is run with all rights of the user. It is only ever named by the user,
 package or by `--effects`; nothing in a YAML or a log can name it.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import traceback

@@ -1,7 +1,5 @@
 """From an answer to a model: the base, what was found at its joint estimate, and its evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The answer to "which effect is missing?", as people and scripts read it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path

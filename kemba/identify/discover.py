@@ -1,7 +1,5 @@
 """From a problem to an answer: search for effects, then doubt what was found."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ pressure times area is physics that eq. 4 to 7 have no name for. Table I gives h
 with the volume to be filled; where the line through them meets zero is the volume of the tubes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

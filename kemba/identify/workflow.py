@@ -1,7 +1,5 @@
 """From files to an answer folder: read, check, search, write."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence

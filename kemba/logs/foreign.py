@@ -1,7 +1,5 @@
 """Foreign columns become ours, as a map says."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What a file of another program holds, before a map says which column is which."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

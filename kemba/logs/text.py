@@ -1,7 +1,5 @@
 """Text tables of other programs: any separator, decimal sign and header."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path

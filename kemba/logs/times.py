@@ -1,7 +1,5 @@
 """Times of recordings: stamps of any kind, rates, gaps."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection
 

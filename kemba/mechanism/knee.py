@@ -1,7 +1,5 @@
 """The closed loop femur - tibia - piston as an analytic map of the knee's flexion."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

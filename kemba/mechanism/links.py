@@ -1,7 +1,5 @@
 """The link table of a robot (configs/robots/*.yaml) as checked data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 

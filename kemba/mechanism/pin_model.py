@@ -1,7 +1,5 @@
 """Link table -> pin.Model: the opened tree, the single source of geometry and inertia."""
 
-from __future__ import annotations
-
 import numpy as np
 import pinocchio as pin
 

@@ -4,8 +4,6 @@ Classical linear accelerations in the world frame: every joint adds one angle, s
 never rotated back and forth. Equal to pin.rnea on the same model (tests/oracle).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The legged robot: tree of the pin.Model, knee loops closed, seen through ports."""
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The one place where robot files are found and read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from kemba.config import Document, is_file, load_yaml, parse, shipped_configs

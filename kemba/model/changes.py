@@ -1,7 +1,5 @@
 """Models changed: numbers by name, or drawn at random."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

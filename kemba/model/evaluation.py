@@ -1,7 +1,5 @@
 """Effects placed on a mechanism: names resolved, signals composed, each evaluated once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any

@@ -4,8 +4,6 @@ Second order, exact for a lag of constant input however short, and stable where 
 stiff: air that flows between nearly equal pressures answers within a fifth of a millisecond.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import casadi as ca

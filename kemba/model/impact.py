@@ -1,7 +1,5 @@
 """How fast an impact is for the robot: feet by their own speed, stops by that of the leg."""
 
-from __future__ import annotations
-
 from kemba.mechanism import Mechanism
 from kemba.mechanism.knee import leg_per_piston
 

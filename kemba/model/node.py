@@ -1,7 +1,5 @@
 """The residual of a model at one instant: symbols, expressions, and what each row means."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

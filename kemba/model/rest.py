@@ -1,7 +1,5 @@
 """Where the effect states of a model come to rest while its motion and commands are held."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 from weakref import WeakKeyDictionary

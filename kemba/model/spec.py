@@ -1,7 +1,5 @@
 """Model YAML (configs/models/*.yaml): a robot or rig, a supply pressure, a list of effects."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from pathlib import Path

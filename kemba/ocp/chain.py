@@ -1,7 +1,5 @@
 """Trajectories in a row."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

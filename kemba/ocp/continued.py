@@ -1,7 +1,5 @@
 """Plans from an earlier run's plan, judged; and what is said where that fails."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from kemba.ocp.certificate.objective import costs, objective

@@ -1,7 +1,5 @@
 """The plan as a table for the robot's 1 kHz controller (paper, IV-B)."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

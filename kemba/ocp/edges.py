@@ -1,7 +1,5 @@
 """Valve edges on the controller's ticks, one after the other, so that impulses keep."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, floor

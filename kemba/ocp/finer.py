@@ -4,8 +4,6 @@ Contacts and valves of a plan are decided on the coarser grid. Its refined plan 
 program near the solution, so that only a few iterations are made on many nodes.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import ceil
 

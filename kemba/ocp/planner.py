@@ -1,7 +1,5 @@
 """Strategies of finding a plan in turn, from coarse to fine and half to whole robot."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property

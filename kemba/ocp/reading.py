@@ -1,7 +1,5 @@
 """Reading a task so that all its mistakes are told at once, whatever finds them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from kemba.config import Document, apply_overrides, find_config, load_yaml

@@ -1,7 +1,5 @@
 """Found plans solved again on their own phases."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from kemba.ocp.certificate.objective import costs

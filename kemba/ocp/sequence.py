@@ -1,7 +1,5 @@
 """A sequence of motions as one problem: grids and contacts in a row, each part at its own times."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Several starts on the cores, the best plan kept."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

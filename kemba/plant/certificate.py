@@ -1,7 +1,5 @@
 """How well a plan executes: its inputs and its table on the same model, its table on the plant."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any

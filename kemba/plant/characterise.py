@@ -1,7 +1,5 @@
 """Air and friction of a cylinder from bench logs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A plan as the robot's controller executes it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ The residual is affine in accelerations and forces: 0 = M(q) a - F - B lam. The 
 by AD from the model's own expressions, so the plant has no physics of its own.
 """
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ compliant, with a force that follows from its depth. Otherwise it is already a r
 velocities and forces, such as a friction cone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

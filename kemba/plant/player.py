@@ -1,7 +1,5 @@
 """One simulation: what the kernel is given, and what it gives back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

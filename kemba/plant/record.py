@@ -1,7 +1,5 @@
 """From the record of the kernel to a trajectory and impacts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from kemba.model import Model

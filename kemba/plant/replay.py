@@ -1,7 +1,5 @@
 """Replay: a plan's own inputs, open loop, on the finely simulated same model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any

@@ -4,8 +4,6 @@ Rounding an edge to a tick of 1 ms can move the apex of a light robot by a centi
 rounding is best depends on the whole motion, so the table is simulated with other roundings.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """The paper's bench rigs: what they impose on a piston, from YAML, and their logs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

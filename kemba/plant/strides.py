@@ -1,7 +1,5 @@
 """Strides of a periodic motion in a row: how many an execution keeps, how errors grow in one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

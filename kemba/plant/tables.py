@@ -1,7 +1,5 @@
 """Tables I and II as rows of text and as JSON, beside the paper's values."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from kemba.plant.characterise import Characteristics, Estimate

@@ -6,8 +6,6 @@ function to have one that `pyplot.show` opens.
 Everything is imported when first asked for: who only reads a log needs no matplotlib.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

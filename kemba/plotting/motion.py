@@ -1,7 +1,5 @@
 """Figures of a motion: strip, body, joints, efforts, valves and contact; or of a bench piston."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Motions to draw: where they come from, the robot they are of, its poses."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

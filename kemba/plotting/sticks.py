@@ -1,7 +1,5 @@
 """Stick figures of the robot: one, a strip of them, an animation."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The course of an executed table: flows, controller ticks, valve edges and impacts in order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations

@@ -1,7 +1,5 @@
 """Playing a policy on a simulated robot."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

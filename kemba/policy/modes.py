@@ -1,7 +1,5 @@
 """Accelerations, impacts and their slopes in each contact mode of a model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -7,8 +7,6 @@
 `hip_rates` (m,) [rad/s]. The first call is for the first row of controller.csv.
 """
 
-from __future__ import annotations
-
 from os import PathLike
 from typing import Any
 

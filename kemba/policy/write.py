@@ -1,7 +1,5 @@
 """A policy's file: everything that its player needs, as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

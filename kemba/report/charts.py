@@ -1,7 +1,5 @@
 """Charts of the review: SVG that scripts can zoom, the tracks they draw, the HTML around them."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Iterable, Sequence

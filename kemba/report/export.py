@@ -1,7 +1,5 @@
 """Trajectories in other formats: MATLAB, NumPy, JSON, and CSV with another program's columns."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """How close a motion comes to the limits of the robot: use, torque and speed, energy."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape

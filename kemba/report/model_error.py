@@ -1,7 +1,5 @@
 """Where the model fails on the logs, by quantity and phase, and what it lacks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass

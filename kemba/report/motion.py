@@ -1,7 +1,5 @@
 """Motions in the review: what happens when, plan and logs over each other."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@
 the multi-phase program of the plan, from the plan.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

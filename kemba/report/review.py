@@ -1,7 +1,5 @@
 """The whole page: verdict, motions, limits, energy, where the model fails, what it lacks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape

@@ -4,8 +4,6 @@ Loading matplotlib and drawing take about as long as the executions; on two core
 same time.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

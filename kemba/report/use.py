@@ -1,7 +1,5 @@
 """How much of what the robot can do was used: torque and speed of the hips, friction, air."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

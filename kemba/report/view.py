@@ -3,8 +3,6 @@
 https://rerun.io; `rerun-sdk` is imported when a recording is asked for.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from html import escape

@@ -1,7 +1,5 @@
 """The next plan corrected by what the last execution missed: its aim, its valve times."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """A round of learning as one HTML page: error before and after, executed and expected."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterable
 from html import escape

@@ -1,7 +1,5 @@
 """One round: discover, adopt what predicts better, plan anew, correct what is left."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """A file of uncertainties, and the scenarios drawn from it."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

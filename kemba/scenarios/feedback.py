@@ -6,8 +6,6 @@ executions, with corrections of hips and edges in 195; 0.4 m ahead both parts ke
 but 10 of them end more than 5 cm from their place, and with edges alone one (by hand).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

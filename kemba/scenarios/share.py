@@ -1,7 +1,5 @@
 """How often a plan succeeds in scenarios."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

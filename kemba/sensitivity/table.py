@@ -1,7 +1,5 @@
 """Both kinds of sensitivity as one table: `sensitivity.csv`."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

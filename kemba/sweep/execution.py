@@ -1,7 +1,5 @@
 """Executing cases, one or a block of them."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from pathlib import Path
 from typing import Any

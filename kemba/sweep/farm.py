@@ -1,7 +1,5 @@
 """Running cases on Dask: every result is kept at once, nothing is done twice."""
 
-from __future__ import annotations
-
 import logging
 import os
 import platform

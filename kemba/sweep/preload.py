@@ -1,7 +1,5 @@
 """Loaded by our own workers: Ctrl-C reaches the whole terminal, but only the client answers it."""
 
-from __future__ import annotations
-
 import signal
 from typing import Any
 

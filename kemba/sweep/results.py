@@ -1,7 +1,5 @@
 """The table of a sweep: results, how many succeeded, and what they depend on."""
 
-from __future__ import annotations
-
 import csv
 import sys
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What a worker does with a case."""
 
-from __future__ import annotations
-
 from kemba.sweep.cases import Record, Work
 
 

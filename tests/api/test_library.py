@@ -1,7 +1,5 @@
 """`import kemba`: what a shell script can do, a script or notebook can."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

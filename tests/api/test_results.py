@@ -1,7 +1,5 @@
 """Results of the library in one line, progress where a person watches, and adopting an answer."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

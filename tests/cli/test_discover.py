@@ -1,7 +1,5 @@
 """`kemba-opt discover`, `adopt` and `experiment`, as scripts see them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

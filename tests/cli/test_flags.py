@@ -1,7 +1,5 @@
 """One style of options over all verbs: the same name for the same thing, and the usual ones."""
 
-from __future__ import annotations
-
 import re
 from collections import defaultdict
 from pathlib import Path

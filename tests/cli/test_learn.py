@@ -1,7 +1,5 @@
 """`kemba-opt learn` with nothing given: the newest run and its logs, and what it says of them."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Too little memory is told in words, within seconds."""
 
-from __future__ import annotations
-
 import errno
 import subprocess
 import sys

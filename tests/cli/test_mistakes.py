@@ -1,7 +1,5 @@
 """Typical mistakes at the command line: what is wrong, and what to do next, in one line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

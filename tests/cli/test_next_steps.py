@@ -1,7 +1,5 @@
 """Every verb says the next one, in words that the program understands."""
 
-from __future__ import annotations
-
 import inspect
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Progress of long work: what is being done, and about how much time is left."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

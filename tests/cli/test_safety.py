@@ -1,7 +1,5 @@
 """Inputs that are wrong or hostile, and places that cannot be written, are answered in words."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

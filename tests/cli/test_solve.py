@@ -1,7 +1,5 @@
 """`kemba-opt solve`, as scripts see it: streams, exit codes, JSON, and what mistakes are told."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`kemba-opt solve` and its models: looked for beside the task, and what a plan cannot use."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

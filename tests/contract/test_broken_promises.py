@@ -1,7 +1,5 @@
 """Each check finds the effect that breaks its promise."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Literal
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """What every effect of the catalogue promises, tried on each of them."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import pytest

@@ -1,7 +1,5 @@
 """Every effect at once, in any order, with either kind of chamber."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

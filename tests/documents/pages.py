@@ -1,7 +1,5 @@
 """What stands on the pages of the documents: commands, code, and where they are executed."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the reader of a page has before its first command, and how its commands end."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

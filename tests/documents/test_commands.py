@@ -1,7 +1,5 @@
 """Every command on every page: its options exist, and it runs and ends as the page says."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Every study that a page names in its text runs, at its smallest size."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

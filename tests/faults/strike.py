@@ -1,8 +1,6 @@
 """Faults while a verb works: signals, full disks, folders that cannot be written, a clock that goes
 back; and the verb again."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """After a fault results are whole, or clearly partial and completed by the same command."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import signal

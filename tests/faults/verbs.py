@@ -1,7 +1,5 @@
 """Long-running verbs as small commands, what each must leave behind, and how it goes on."""
 
-from __future__ import annotations
-
 import atexit
 import json
 import shutil

@@ -1,7 +1,5 @@
 """YAML files to be tried: made from a kind's JSON Schema, or a shipped file with damage."""
 
-from __future__ import annotations
-
 import copy
 import re
 from collections.abc import Callable

@@ -1,8 +1,6 @@
 """Logs in other formats, damaged: bytes that are cut, changed or repeated, and whole files with odd
 content. A file is a text of its ending, a colon, and its bytes as Latin-1."""
 
-from __future__ import annotations
-
 import io
 import json
 import tempfile

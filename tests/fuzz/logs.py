@@ -1,7 +1,5 @@
 """Logs to be tried: a sound one with one to three kinds of damage, and damaged sidecars."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

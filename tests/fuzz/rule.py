@@ -4,8 +4,6 @@ Exit code 0; or 1 with a reason; or 2 with a message that names the file. Never 
 failed unexpectedly"), never a hang.
 """
 
-from __future__ import annotations
-
 import contextlib
 import signal
 import threading

@@ -1,7 +1,5 @@
 """Sound logs, to be damaged: a short bench log of the planning model, and a hop of the twin."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

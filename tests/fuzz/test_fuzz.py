@@ -4,8 +4,6 @@
 can be made, under a name that says what happened.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

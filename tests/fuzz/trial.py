@@ -1,7 +1,5 @@
 """One trial: an input is drawn, written to a file, and held against the rule."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Values that have broken programs: sizes, signs, units, expressions, names, nesting."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

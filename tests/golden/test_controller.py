@@ -1,7 +1,5 @@
 """The controller table of a plan made by hand, to the last digit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

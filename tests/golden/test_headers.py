@@ -1,7 +1,5 @@
 """The tables that others read: their columns, in their order, as they have always been."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Small bench logs made by the model itself, to be damaged or to be explained."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Rows of the blind studies about three to five effects at once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from blind.report import table

@@ -1,7 +1,5 @@
 """The worked examples of the documents: their commands run, and find what the pages say."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Maps that are drafted for logs of other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import foreign_files

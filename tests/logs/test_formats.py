@@ -1,7 +1,5 @@
 """Binary formats of logs give back every bit; damaged files are told in words."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

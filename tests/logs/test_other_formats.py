@@ -1,7 +1,5 @@
 """Formats of data loggers, simulators and middleware, written by their own libraries."""
 
-from __future__ import annotations
-
 import sqlite3
 import struct
 from contextlib import closing

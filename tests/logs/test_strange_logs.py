@@ -1,7 +1,5 @@
 """Logs in the ways of other programs are read right, or a person is asked; none is read wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

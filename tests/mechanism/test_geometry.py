@@ -1,7 +1,5 @@
 """Lengths that differ from the drawing: the model with them is the model of the other robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

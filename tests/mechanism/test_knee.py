@@ -1,7 +1,5 @@
 """The knee's closed loop: there and back, its slope, its reach."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

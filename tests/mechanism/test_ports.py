@@ -1,7 +1,5 @@
 """Ports: velocity, acceleration and effort by automatic differentiation, against differences."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Tolerances of links: declared with the link table, exact in their force, read by discover."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import casadi as ca

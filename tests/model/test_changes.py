@@ -1,7 +1,5 @@
 """Parameters of a model's effects, changed by a task or by `--set`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A model: the same whatever the order of its list, every row labelled, every mistake explained."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

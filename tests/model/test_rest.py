@@ -1,7 +1,5 @@
 """Where chambers, hoses and supply come to rest."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """benchmarks/nosbench.py: files are drawn once, and answers are judged and counted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

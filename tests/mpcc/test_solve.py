@@ -1,7 +1,5 @@
 """kemba.solve_mpcc on small programs whose solutions are known."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

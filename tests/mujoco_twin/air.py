@@ -3,8 +3,6 @@
 Plain numbers, one explicit step at a time: a step of 50 us is a hundredth of every time constant.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

@@ -3,8 +3,6 @@
 paths, truth = robot_case(folder, ["seal_friction", "payload"], seed=3, runs=5)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

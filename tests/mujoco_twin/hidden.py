@@ -1,7 +1,5 @@
 """What is hidden in a machine: effects by name, put where they belong in bodies, air and drives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The robot's link table as a MuJoCo model: planar joints, loops closed by equality constraints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

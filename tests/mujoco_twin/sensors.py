@@ -1,7 +1,5 @@
 """Sensors of the second twin: a filter, a colour and a step of its own in every channel."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Ten tasks that cannot be met, and what the answer must name."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 SLICK = "name: slick\nbase: planning\neffects:\n  - {kind: contact, mu: 0}\n"

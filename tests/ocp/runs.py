@@ -1,7 +1,5 @@
 """Runs of `kemba-opt solve`, each made once a session and read back from its files."""
 
-from __future__ import annotations
-
 import atexit
 import shutil
 import tempfile

@@ -1,7 +1,5 @@
 """Requirements are measured on the motion itself, not on the rows of a program."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

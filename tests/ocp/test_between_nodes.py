@@ -1,7 +1,5 @@
 """A joint between nodes: cubics are met exactly, also behind an impact."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.ocp.controller import course

@@ -1,7 +1,5 @@
 """The certificate on plans made by hand: every residual is measured, every tolerance is kept."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from ocp.runs import solved

@@ -1,7 +1,5 @@
 """Motions in a row: one trajectory, requirements at their own times, the files of a sequence."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What counts as violated and what is kept: half a plan, the better iterate, rounded valves."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

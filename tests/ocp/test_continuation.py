@@ -1,7 +1,5 @@
 """Plans for changed figures from an earlier plan: refined, replaying, and honest when it fails."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

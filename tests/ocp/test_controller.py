@@ -1,7 +1,5 @@
 """controller.csv: 1 kHz, hips interpolated, valves switched the dead time early."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from ocp.runs import QUICK, Solved, solved

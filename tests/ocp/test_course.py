@@ -1,7 +1,5 @@
 """The course of a start guess: where feet are between their stances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Valves that dwell: rounding fills in short pulses, the phases' program bounds their length."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

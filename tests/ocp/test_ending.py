@@ -1,7 +1,5 @@
 """How solves end: what IPOPT says is read in one place, and reports have its words."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

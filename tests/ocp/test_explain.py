@@ -1,7 +1,5 @@
 """Why not: every impossible task ends with exit 1 and names a true culprit."""
 
-from __future__ import annotations
-
 import json
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`feet`: a task may say how high the feet are at the top instead of how high the body is."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A plan on many nodes is sought on fewer; its solution starts the finer program."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

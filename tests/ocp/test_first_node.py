@@ -1,7 +1,5 @@
 """Physics at the first node: no plan starts below the ground, and the certificate would tell."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

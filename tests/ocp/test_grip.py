@@ -1,7 +1,5 @@
 """`grip`: plans that use a part of the ground's friction, on a ground that has all of it."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

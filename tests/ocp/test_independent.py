@@ -1,7 +1,5 @@
 """Equalities at one node: the dependent ones are left out, those that contradict are told."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pulses that lower the cost: where multipliers see them, and what becomes of a plan with them."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Optima known from the books, found by the classes that plan the robot's jumps."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

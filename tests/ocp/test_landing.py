@@ -1,7 +1,5 @@
 """Holding before the plan, clear feet in flight, soft landings, and goals that last or grow."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from ocp.runs import Solved, solved

@@ -1,7 +1,5 @@
 """Lifted functions give the numbers of the plain ones."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

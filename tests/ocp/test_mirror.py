@@ -1,7 +1,5 @@
 """The half problem: found where model and task are their own mirror image, refused elsewhere."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

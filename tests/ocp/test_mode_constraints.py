@@ -1,7 +1,5 @@
 """Rows of the phases' program, built for a plan and read without solving it."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Programs with complementarity pairs from the literature, whose optima are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from mpcc.methods import on_branch, schedule

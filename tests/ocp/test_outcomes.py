@@ -1,7 +1,5 @@
 """What solving answers when it fails, is repeated, or is asked to use only half the robot."""
 
-from __future__ import annotations
-
 import math
 import time
 

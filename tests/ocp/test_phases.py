@@ -1,7 +1,5 @@
 """Refined plans: modes read off a plan, phases solved, and what an independent replay says."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import replace
 from functools import lru_cache

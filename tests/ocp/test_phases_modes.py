@@ -1,7 +1,5 @@
 """Modes read off a plan: what opens for a moment stays closed, the last switch before a stop."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The program's derivatives against differences, its rows' names, its grids."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """The collocation schemes: Radau IIA's order conditions, stage by stage and over a step."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

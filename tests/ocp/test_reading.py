@@ -1,7 +1,5 @@
 """All mistakes of a task are told in one round: of keys, values, names and changed effects."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

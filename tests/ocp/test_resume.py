@@ -1,7 +1,5 @@
 """Interrupts, time limits, and going on from what they leave."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

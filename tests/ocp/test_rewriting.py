@@ -1,7 +1,5 @@
 """Functions rewritten for speed give the numbers of the plain ones; so does a proximal term."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

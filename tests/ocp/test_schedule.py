@@ -1,7 +1,5 @@
 """The order of solves: whole robots grow from half ones, and switches move as often as asked."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The shipped tasks are solved, and their plans, read back from disk, obey the physics."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

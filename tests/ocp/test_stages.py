@@ -1,7 +1,5 @@
 """A plan that was solved starts the next one from its own stages, not from its nodes alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

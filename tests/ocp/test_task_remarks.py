@@ -1,7 +1,5 @@
 """Figures of a task that nothing in it refers to."""
 
-from __future__ import annotations
-
 import pytest
 
 from kemba.config import Document, shipped_configs

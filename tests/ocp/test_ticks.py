@@ -1,7 +1,5 @@
 """Valve edges of a plan on the controller's ticks: its table then is the plan."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

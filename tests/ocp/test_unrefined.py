@@ -1,7 +1,5 @@
 """What a plan is called that could not be refined."""
 
-from __future__ import annotations
-
 import pytest
 from plain_task import plain_task
 

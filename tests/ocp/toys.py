@@ -1,7 +1,5 @@
 """Small mechanisms with known motions, through the same Transcription as the robot."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import ClassVar, Literal

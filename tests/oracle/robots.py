@@ -1,7 +1,5 @@
 """The shipped robot and a stranger, with their opened trees and random states."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """The symbolic dynamics against Pinocchio's numeric algorithms on the opened tree."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pinocchio as pin

@@ -1,7 +1,5 @@
 """Passive flight, integrated by another hand: energy and momentum with the boom's share."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """The robot's published numbers, as the mechanism has them."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 import pytest

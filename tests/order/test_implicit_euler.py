@@ -1,7 +1,5 @@
 """The transcription is implicit Euler: first order on motions that are known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

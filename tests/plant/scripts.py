@@ -1,7 +1,5 @@
 """Motions that several tests look at: a drop, a jump-like script, a robot in the air."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The simulator that is loaded while a plan is sought."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from textwrap import dedent

@@ -4,8 +4,6 @@ Tolerances: in flight the two integrate the same equations, MuJoCo with its loop
 springs; at touchdown MuJoCo's contact is stiff and damped where the plant's is inelastic.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 import mujoco
 import numpy as np

@@ -1,7 +1,5 @@
 """Edges of a table are moved where its execution shows that this comes nearer to the plan."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

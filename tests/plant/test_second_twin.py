@@ -3,8 +3,6 @@
 Ground, stops, loops and boom of the twin give way a little, so heights agree to a millimetre.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A planned bound (`kemba-opt solve bound.yaml`): executions begin in motion, strides repeat."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

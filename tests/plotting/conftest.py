@@ -1,7 +1,5 @@
 """A made-up jump that looks like a plan: level body, both legs alike, ballistic flight."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What executions are expected to do: noise alone moves nothing, what is inferred is right."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Feedback: the hybrid map agrees with the plant's differences; a policy plays and corrects."""
 
-from __future__ import annotations
-
 import ast
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A few blind cases, fixed: logs from the twin, which shares no code with the fit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A few blind robot cases, fixed: jumps of the twin, which shares no code with the fit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

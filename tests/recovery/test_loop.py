@@ -1,8 +1,6 @@
 """The loop closed: an effect adopted from an answer brings the error down on a run that was never
 fitted, and the next plan is made with it. The quick case is the loop once, on three hops."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The same data written in another way get the same answer: a test that needs no truth."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

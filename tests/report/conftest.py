@@ -1,7 +1,5 @@
 """A real browser for pages, and a jump with its logs; skipped where there is no browser."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Logs that are not those of the run are told, on the page and on the command line."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Pages in a real browser: nothing is fetched, nothing fails, keyboard, paper and phone work."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field

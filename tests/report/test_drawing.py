@@ -1,7 +1,5 @@
 """The figure is the same whoever draws it, and a process that dies is replaced."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`report`, `view` and `export`: what a run looks like elsewhere."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from html.parser import HTMLParser

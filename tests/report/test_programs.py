@@ -1,7 +1,5 @@
 """Exported programs: a CasADi without kemba reads them and finds the same numbers."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Recordings for the Rerun viewer hold the robot, its plan, every column, and their layout."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`review`: the words and numbers of the page; how it looks is tested in a browser."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

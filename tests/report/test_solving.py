@@ -1,7 +1,5 @@
 """`solve` as a whole: replays in the certificate, several starts, the best kept."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

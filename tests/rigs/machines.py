@@ -1,7 +1,5 @@
 """Rigs simulated by SciPy, which share no code with the fit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rigs of the user's own: what was put into a simulation is found in its log, and nothing else."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Robot files: how they are found, what they may hold, and who reads them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What is known of a robot reaches everyone who needs it, whatever its name."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

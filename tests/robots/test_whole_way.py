@@ -1,7 +1,5 @@
 """Robots other than kemba through every verb: check, solve, simulate, compare, discover."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The pieces of a round: flights, corrections, rounds, aimed tables."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

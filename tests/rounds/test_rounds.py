@@ -1,7 +1,5 @@
 """Whole rounds on machines that differ from the model: the error falls, round by round."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

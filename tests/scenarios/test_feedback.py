@@ -1,7 +1,5 @@
 """Parts of a policy that make executions fail are not kept."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

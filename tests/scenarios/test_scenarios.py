@@ -1,7 +1,5 @@
 """Scenarios of robust planning: what is drawn, and the share that succeeds."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

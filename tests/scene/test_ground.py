@@ -1,7 +1,5 @@
 """The ground: numbers and symbols agree, derivatives are finite, edges lie on the lower side."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The whole house raised or moved: the same model, the same program, the same motion."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import casadi as ca

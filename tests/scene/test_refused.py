@@ -1,7 +1,5 @@
 """Scenes that cannot be are refused in words before any solve."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Plans that the user has made start further ones; nothing depends on them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Robust planning: which plans are tried, and which is taken."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

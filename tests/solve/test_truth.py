@@ -1,7 +1,5 @@
 """Whose verdict counts: a model that was learnt from logs outranks the simulated robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

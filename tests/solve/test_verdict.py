@@ -1,7 +1,5 @@
 """The verdict on executed plans: tolerances, words, exit code."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

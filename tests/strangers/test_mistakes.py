@@ -1,7 +1,5 @@
 """Mistakes in YAML files, as newcomers make them: the answer says where, and what was expected."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A newcomer's first hour: the README, the logs of another program, a MATLAB file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """What a newcomer types, and the sentences that come back."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

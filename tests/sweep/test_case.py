@@ -1,7 +1,5 @@
 """Cases and their keys: the same content is the same case, whatever the order it is written in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`python -m twin robot|bench --effect NAME --seed N --out DIR`: write a case of logs."""
 
-from __future__ import annotations
-
 import argparse
 import json
 

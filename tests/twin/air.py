@@ -5,8 +5,6 @@ hysteresis force].  A chamber's state is its force (first order, eq. 4-5) or, wi
 its absolute pressure (eq. 1-3 with the compression term's sign put right).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .catalogue import (

@@ -1,7 +1,5 @@
 """The one-piston rig: x(t) is imposed, the force on the transducer is the answer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ of femur, tibia, piston body and piston rod.  A link at angle a points along (si
 Twenty constraint rows leave the seven freedoms of the robot.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .figures import (

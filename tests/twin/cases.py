@@ -6,8 +6,6 @@ The truth is returned and written to `truth.json` in the folder's `.truth` sub-f
 way of whoever globs for logs.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

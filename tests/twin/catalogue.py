@@ -4,8 +4,6 @@ The kernels read two plain tables: `leg[2, :]` (per-leg effects) and `body[:]` (
 or 1 for scales.  Sensor effects never come here: see `measure`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

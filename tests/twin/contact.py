@@ -1,7 +1,5 @@
 """Ground and end stops as stiff, overdamped springs: as good as rigid, and hardly any rebound."""
 
-from __future__ import annotations
-
 from .catalogue import B_GROUND_D, B_GROUND_K, B_MU
 from .figures import STROKE
 from .jit import njit

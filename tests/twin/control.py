@@ -1,7 +1,5 @@
 """The hip controller (eq. 10) with the motor's torque and speed limits."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .figures import (

@@ -5,8 +5,6 @@ file would be served stale.  Naming the folder after the content of all kernel f
 (and after the package name: compiled code remembers under which name it was imported).
 """
 
-from __future__ import annotations
-
 import getpass
 import hashlib
 import os

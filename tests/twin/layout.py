@@ -1,7 +1,5 @@
 """From the robot's seven measured coordinates to the nine bodies and back."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .bodies import NQ

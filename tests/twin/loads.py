@@ -1,7 +1,5 @@
 """Where the links are and what pulls at them: ports of the robot, hips, body and boom."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .air import A_TORQUE, N_AIR

@@ -1,7 +1,5 @@
 """CSV logs with their sidecars, in the project's table format."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -5,8 +5,6 @@ steps that end on every valve event and control tick; after each tick the pose i
 the constraints.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .air import A_TORQUE, N_AIR, air_rates, rod_force

@@ -1,7 +1,5 @@
 """Sensors: sampling, noise, quantisation, faults and gaps.  Nothing here moves the robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parametric motions.  Each takes a random generator, so different seeds move differently."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .figures import STANCE_Z

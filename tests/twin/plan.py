@@ -4,8 +4,6 @@ An operator would send a planned trajectory; here a crude on/off rule on each kn
 Its valve switches and hip angles become the script that the (defective) robot then executes blind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Motions by name and seed.  Planning one takes seconds, so each is kept on disk once made."""
 
-from __future__ import annotations
-
 import os
 from functools import lru_cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the rig is made to do: imposed strokes and sent valves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

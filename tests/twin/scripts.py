@@ -1,7 +1,5 @@
 """Command scripts: hip references, open-loop valves, and where it starts."""
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass, field, replace
 from pathlib import Path

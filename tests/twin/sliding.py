@@ -2,8 +2,6 @@
 short push and sink with both valves open. So a log shows how rough the ground is, and the loss of
 both valves open, which jumps and squats may leave out."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .plan import Demand, Sight, record

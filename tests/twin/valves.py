@@ -1,7 +1,5 @@
 """From sent valve commands to what the valves do: dead time, late closing, merged pulses."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .figures import DEAD_TIME

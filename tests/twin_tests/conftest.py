@@ -1,7 +1,5 @@
 """One short hop of the blind twin, simulated once."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("numba")

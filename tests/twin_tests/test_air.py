@@ -1,7 +1,5 @@
 """The blind twin's chambers and valves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

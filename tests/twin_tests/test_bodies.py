@@ -1,7 +1,5 @@
 """The blind twin is only worth something if its own physics is right: bodies and ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Every effect of the blind twin shows, and is the formula it says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the blind twin's sensors write."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

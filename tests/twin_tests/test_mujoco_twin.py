@@ -1,7 +1,5 @@
 """The second twin's own parts: air, sensors, and where a hidden effect is put."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The support boom as the body feels it: inertia, weight, bearings, and errors of its lever."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Annotated, ClassVar
 

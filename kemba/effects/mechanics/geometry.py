@@ -1,7 +1,5 @@
 """Lengths of the machine that differ from the drawing."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import field_validator

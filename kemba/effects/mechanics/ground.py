@@ -1,7 +1,5 @@
 """Foot contact: the rigid ground with Coulomb friction, and ground that differs from it."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, ClassVar
 

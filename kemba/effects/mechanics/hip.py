@@ -1,7 +1,5 @@
 """The hip joint and its quasi-direct-drive motor."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar
 
 from kemba.effects.base import At, Contribution, Effect, HipEffect, Signal

@@ -3,8 +3,6 @@
 Each gives the force [N] or torque [N.m] on the moving part.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Mass carried by, or misplaced on, the body."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """Along the piston: end stops, friction of the seals, dampers and springs."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import casadi as ca

@@ -1,8 +1,6 @@
 """Figures of air, and its flow through a thin-plate orifice (paper, eq. 2 and 3), smooth through
 equal pressures."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

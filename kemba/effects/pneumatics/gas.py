@@ -3,8 +3,6 @@
 An ideal gas of mass m = P V/(R T) and one temperature. What flows out carries its own temperature.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """What happens to the air between valve, hose and chamber."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from kemba.effects.base import AirEffect, At, Contribution, Signal

@@ -1,7 +1,5 @@
 """The air that reaches the chambers: its pressure, its droop, its flow rate; tank and hose."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 import casadi as ca

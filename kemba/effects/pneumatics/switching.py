@@ -3,8 +3,6 @@
 Simulator, bench and robot identification all switch their valves here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

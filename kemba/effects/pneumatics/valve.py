@@ -1,7 +1,5 @@
 """Binary on/off valves (paper, eq. 8 and section III-A), their dead time, and later switching."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from kemba.effects.base import AirEffect, Effect

@@ -1,7 +1,5 @@
 """What every drive is: a motor that pushes an inertia, and what hangs on it."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar
 
 import casadi as ca

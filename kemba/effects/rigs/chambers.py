@@ -1,7 +1,5 @@
 """Chambers whose pressures are measured: no valves, the sensors say what pushes."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Literal
 
 from kemba.effects.base import At, Contribution, Effect

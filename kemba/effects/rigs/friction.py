@@ -1,7 +1,5 @@
 """Friction of a drive: bearings, screws, belts and gears."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar
 
 import casadi as ca

@@ -5,8 +5,6 @@ the chambers then seem to fill later and later, as with a hose that grows. Such 
 before any fit, and the logs are put on one clock; what is left of the rate is a nuisance parameter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Forces on the rod of a bench: what its rows saw, what is missing, terms beyond the catalogue."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Position and velocity of an imposed motion from a noisy, jittering position sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """What a bench log should read under a model, with effects on its list and sensors as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 

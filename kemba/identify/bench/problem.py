@@ -1,7 +1,5 @@
 """Bench logs under one model: the force predicted along the imposed motion, as residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace

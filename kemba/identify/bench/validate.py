@@ -1,7 +1,5 @@
 """Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Errors by condition: channel, phase of motion, valve mode and region of the piston's stroke."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

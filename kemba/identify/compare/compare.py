@@ -1,8 +1,6 @@
 """Where a model fails: noise ratios by channel and condition, what the error goes with, how much
 force is missing, and one plain sentence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any

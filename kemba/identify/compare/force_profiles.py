@@ -4,8 +4,6 @@ The force is taken as constant within bins of the quantity. Its values follow by
 the whitened residuals. So their intervals are those of the noise, and no smoothing shrinks them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

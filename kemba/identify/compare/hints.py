@@ -1,8 +1,6 @@
 """What the error goes with: a force by speed, position or load, commands sent before it, and
 parameters that would have to differ between runs or between valve modes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

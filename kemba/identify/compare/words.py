@@ -1,7 +1,5 @@
 """Conditions of errors in words: of which quantity, in which phase, with which valves open."""
 
-from __future__ import annotations
-
 from math import degrees
 
 from kemba.identify.compare.bins import ConditionBin

@@ -1,8 +1,6 @@
 """The next test of a rig: a course of the rod and the valves that tells rivals apart, or a
 standard test where that is better."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

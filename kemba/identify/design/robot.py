@@ -6,8 +6,6 @@ can be tried on the simulation before any plan is made; the task asks for the sa
 times, and planning finds the torques.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterator

@@ -6,8 +6,6 @@ that may bend to help B is free within its prior: its own parameters, the nomina
 model, and how each log begins.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Logs that tests of a rig would give, without the rig, and the standard tests judged by them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The clock of a log against that of the plan it executes: by the valve commands of both."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.trajectory import Array, Trajectory

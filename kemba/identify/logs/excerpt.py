@@ -1,7 +1,5 @@
 """Long logs are shortened: rows about 1 ms apart, and one minute of pieces spread over the log."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

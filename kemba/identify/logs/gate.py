@@ -1,7 +1,5 @@
 """Checks before a fit: a log that cannot be right is refused, with row and column."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np

@@ -1,8 +1,6 @@
 """What the way in which logs were taken costs: slow or uneven rows, odd clocks, coarse sensors,
 unused columns."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

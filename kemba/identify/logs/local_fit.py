@@ -3,8 +3,6 @@
 What `scipy.signal.savgol_filter` gives; its import takes half a second of every comparison.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

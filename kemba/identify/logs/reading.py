@@ -1,7 +1,5 @@
 """Reading logs: own format or foreign columns through a map; robot or bench is read off them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path

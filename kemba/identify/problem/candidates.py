@@ -1,7 +1,5 @@
 """What may be missing: effects of the catalogue that a model could have, and sensor faults."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from typing import Generic, TypeVar
 

@@ -4,8 +4,6 @@ A missing force is a first-order lag of white noise whose strength is learnt fro
 noise make a tridiagonal system, which is fast for long logs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Sensor faults as identification names them: which may be there, and which are, at theta."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from kemba.effects import BY_KIND

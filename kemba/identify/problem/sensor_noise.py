@@ -7,8 +7,6 @@ through the same filter tells which. The measured autocovariances are a sum of t
 weights: the variances of the kinds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

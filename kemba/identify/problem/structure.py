@@ -6,8 +6,6 @@ An orifice of infinite area is as good as none, so the supply line is searched b
 its area, which is 0 where all of the tank's pressure reaches the valves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -4,8 +4,6 @@ A drive of a clock and a drive of a crane have other frictions. So every force i
 one usual force of the rig, and every speed and travel against those of the logs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ Least squares on the residuals within what a model can have; intervals from bloc
 what runs say that disagree (`written.scatter`). They are those of one mounting of one machine.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The force that a rig's logs should show, with effects switched on and sensors as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Logs of a cylinder with measured pressures or of a drive: the balance of forces as residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ function of the position, such as the weight of a pendulum, is filtered itself: 
 filter is not the sine of what is behind it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

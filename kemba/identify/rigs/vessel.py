@@ -1,7 +1,5 @@
 """Logs of a vessel that blows down: pressure and temperature predicted from the start."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

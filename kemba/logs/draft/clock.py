@@ -1,7 +1,5 @@
 """Which column is the time: all candidates, scored, the best with its reason."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

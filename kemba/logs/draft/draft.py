@@ -1,7 +1,5 @@
 """Draft a column map for a log of another program, from names, units and ranges."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Which foreign column is which of ours: the assignment that agrees best with all names."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What the words in a column's name may mean."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@ A reader takes a path and gives a `Recording`; its package is imported when the 
 opened. A new format is a line of `READERS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Logs as named arrays: NumPy .npz, JSON, and MATLAB files with structs and Simulink objects."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

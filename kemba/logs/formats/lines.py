@@ -1,7 +1,5 @@
 """Text formats with a header of their own: LabVIEW's .lvm, OpenSim's .sto and .mot."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Logs of data loggers: MDF (asammdf), TDMS (nptdms), ULog (pyulog); channels keep their clocks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Logs as Parquet tables, one column each."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a written plan really satisfies: residuals measured from the trajectory itself."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

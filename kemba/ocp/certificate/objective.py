@@ -1,7 +1,5 @@
 """The cost of a plan as its task weighs it, to compare plans of one task."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """Status and sentence of a plan, from what was measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from enum import Enum
 

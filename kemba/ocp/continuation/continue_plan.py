@@ -1,7 +1,5 @@
 """The earlier plan solved again for changed figures, on its own phases."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace

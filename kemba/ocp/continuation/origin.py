@@ -1,7 +1,5 @@
 """Earlier plans as origins, their solved programs in a file."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Sparse NLP functions from small blocks: exact patterns, derivatives mapped over the nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

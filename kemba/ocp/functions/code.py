@@ -5,8 +5,6 @@ Most of their blocks are the same expressions at other places. Differentiating a
 most of the time of building a program, so it is done once for each expression.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """What is asked of a nonlinear program and of its functions."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import casadi as ca

@@ -4,8 +4,6 @@ Where the cost is flat, as for forces that legs share, Newton steps become long 
 lose feasibility. The proximal term gives these directions curvature and hardly moves the optimum.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import casadi as ca

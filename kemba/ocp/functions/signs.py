@@ -5,8 +5,6 @@ this and computes both. Here signs are moved out of even and odd functions, prod
 that both legs share the same expressions. Rounding does not change: IEEE arithmetic is symmetric.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Energy, time and friction that a task needs, against what the robot can give."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from kemba.config import Document

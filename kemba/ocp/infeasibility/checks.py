@@ -3,8 +3,6 @@
 A certain diagnostic refuses the task; the others become hints if solving fails.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 

@@ -1,7 +1,5 @@
 """What prevents a plan: a sentence, the requirement to relax, and how certain it is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The same program with requirements that may be violated at an l1 cost; the physics must hold."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

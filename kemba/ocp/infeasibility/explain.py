@@ -1,7 +1,5 @@
 """Why a task has no plan: violated requirements, by how much, and the limits reached."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A task that asks for a flight: what it lifts, how far, and what the robot can give."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

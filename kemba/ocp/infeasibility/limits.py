@@ -1,7 +1,5 @@
 """Which limits of the robot a plan reaches, in words."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

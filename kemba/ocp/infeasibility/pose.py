@@ -1,7 +1,5 @@
 """Poses: can the requirements at one moment hold together, and which of them must be relaxed?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """From loose to tight pairs: relaxed programs, each as exact as its relaxation is tight."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """A program with complementarity pairs, from CasADi symbols to what IPOPT evaluates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

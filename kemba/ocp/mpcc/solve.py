@@ -1,7 +1,5 @@
 """`kemba.solve_mpcc`: a program with complementarity pairs, solved and verified."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

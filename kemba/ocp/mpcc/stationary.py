@@ -5,8 +5,6 @@ direction descends then. Where one does, the multipliers may not be the only one
 branch may be cheaper: the linear program with complementarity pairs decides (B-stationarity).
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

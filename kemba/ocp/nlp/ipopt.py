@@ -1,7 +1,5 @@
 """The one wrapper of IPOPT: start, bounds, options, limits, its text in a log file."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """IPOPT's callback after every iteration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import casadi as ca

@@ -1,7 +1,5 @@
 """The position of every variable of a multi-phase program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

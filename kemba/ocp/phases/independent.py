@@ -1,7 +1,5 @@
 """Equalities at one node: which of them are linearly independent, and whether the others agree."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

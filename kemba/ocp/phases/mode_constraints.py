@@ -1,7 +1,5 @@
 """Mode constraints: closed gaps stay zero, open ones positive, friction stays in its cone."""
 
-from __future__ import annotations
-
 import itertools
 
 import casadi as ca

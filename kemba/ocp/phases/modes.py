@@ -1,7 +1,5 @@
 """The mode sequence of an implicit Euler plan: which contacts and stops are closed, which slide."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

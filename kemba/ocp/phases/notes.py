@@ -1,7 +1,5 @@
 """The phases of a plan as texts, which a run keeps so that another plan can start from them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The multi-phase program: smooth, with phase durations free and every mode fixed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Radau IIA collocation of one element and an inelastic impact, as scaled rows of the residual."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A task's requirements on the multi-phase program, at element ends."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import casadi as ca

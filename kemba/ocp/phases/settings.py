@@ -1,7 +1,5 @@
 """Settings of the refinement: how modes are read, solved and repaired. See docs/solving.md."""
 
-from __future__ import annotations
-
 from kemba.settings import Settings, setting
 
 TRIALS = "tuned: trials that docs/solving.md describes"

@@ -4,8 +4,6 @@ A table with many short pulses loses millimetres when its edges are rounded afte
 edges on ticks beforehand the plan is the best one that a table can hold.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import casadi as ca

@@ -5,8 +5,6 @@ is, to first order, what the cost changes by if the valve is turned there: the m
 gradient of a switched system (Egerstedt, Wardi and Axelsson, IEEE TAC 51, 2006).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ The elastic program is an exact penalty: its slacks are zero but where modes con
 So the mode of a constraint changes in those elements only, the way the sign of the slack says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

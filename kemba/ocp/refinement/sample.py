@@ -1,7 +1,5 @@
 """The solved multi-phase program as a trajectory at element ends, and its own defects."""
 
-from __future__ import annotations
-
 import casadi as ca
 import numpy as np
 

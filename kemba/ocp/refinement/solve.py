@@ -1,7 +1,5 @@
 """A multi-phase program solved by IPOPT."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

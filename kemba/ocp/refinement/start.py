@@ -1,7 +1,5 @@
 """The start of the multi-phase program: the implicit Euler plan on its grid."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.ocp.phases.columns import Columns

@@ -5,8 +5,6 @@ under its hips. With `contacts`, each foot stands where its hip passes in the mi
 and swings from there to its next place; the body flies on parabolas between the stances.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass

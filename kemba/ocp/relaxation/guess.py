@@ -4,8 +4,6 @@ The body and the feet follow a course in outline, see `course`; legs follow by i
 forces and valves by virtual work.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

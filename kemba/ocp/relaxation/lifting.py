@@ -1,7 +1,5 @@
 """Starts from other plans: of half the robot for the whole one, of a written run on any grid."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

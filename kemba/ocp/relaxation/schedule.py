@@ -1,8 +1,6 @@
 """The steps of the schedule: relaxed pairs from a start inside the bounds, valves rounded and
 fixed, pairs tightened. See docs/solving.md."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Settings of the schedule: what each solve asks, and when one gives up. See docs/solving.md."""
 
-from __future__ import annotations
-
 from kemba.settings import CHOSEN, Settings, setting
 
 # Both on the jumps of configs/sweeps/reliability.yaml; the code of the trials was not kept.

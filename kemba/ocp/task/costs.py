@@ -1,7 +1,5 @@
 """Costs: what one step adds to the time integral of each, by name or by an expression."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import casadi as ca

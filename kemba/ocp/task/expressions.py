@@ -4,8 +4,6 @@
 `at(end, body/vx) - at(start, body/vx)` compares two moments.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Moments of a motion as shares of its nodes: by name, number, or an event of its contacts."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

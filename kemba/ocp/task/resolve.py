@@ -1,7 +1,5 @@
 """From a task's names to requirements on a model's quantities, every mistake at its line."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet

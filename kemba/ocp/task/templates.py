@@ -1,7 +1,5 @@
 """Words of a task that stand for several requirements: `clearance`, `contacts`, `periodic`, ..."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import operator

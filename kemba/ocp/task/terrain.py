@@ -1,7 +1,5 @@
 """What the scene of a task means for its requirements: names, lines that cannot be, ground."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 

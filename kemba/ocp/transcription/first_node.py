@@ -5,8 +5,6 @@ equations of a step end at later nodes. What is true of every state still holds 
 below the ground, pistons are within their stroke, and limits hold without inputs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What a node's vector holds: q, v, s, u, lam, h, scaled, possibly of half a robot."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The parameters of a transcription's program, as a schedule sets them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """A solved program as a trajectory at the nodes, and back."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.model import Model

@@ -1,7 +1,5 @@
 """One step of implicit Euler as scaled, labelled rows of two neighbouring nodes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Mirror symmetry: a level task on a symmetric model needs only half of the variables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

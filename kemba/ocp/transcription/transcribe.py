@@ -16,8 +16,6 @@ g   all rows: m rows of step 1, ..., m rows of step N; then the requirements tha
 p   (5,): relaxation of the pairs and four weights (see `parameters`)
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property

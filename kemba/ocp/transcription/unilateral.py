@@ -1,7 +1,5 @@
 """The unilateral constraints of a model: feet on the ground and pistons at their stops."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import casadi as ca

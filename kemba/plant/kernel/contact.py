@@ -1,7 +1,5 @@
 """Which pairs take part, the forces that hold them, impacts and accelerations at one instant."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import ir

@@ -1,7 +1,5 @@
 """Advancing through contact events: touchdowns end a step, impacts are inelastic."""
 
-from __future__ import annotations
-
 from math import ceil, copysign, sqrt
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ loaded only from a folder that belongs to the user and that nobody else can writ
 every process compiles anew.
 """
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator

@@ -5,8 +5,6 @@ method (lexicographic, hence finite for contact with friction: Stewart and Trink
 where that fails.
 """
 
-from __future__ import annotations
-
 from kemba.plant.kernel.jit import kernel, part
 from kemba.plant.kernel.machine import Array, Lcp
 

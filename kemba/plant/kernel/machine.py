@@ -1,7 +1,5 @@
 """What the kernel is given: a model's machine code and structure, memory to work in, a state."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A whole simulation: from mark to mark, inputs, controller, impacts and record."""
 
-from __future__ import annotations
-
 from math import isfinite, isnan
 from typing import NamedTuple
 

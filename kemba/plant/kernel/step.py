@@ -11,8 +11,6 @@ Closed contacts are held at velocity level at the end of both stages, as half-ex
 methods do for index 2; lam1 and lam2 solve small complementarity problems w = A lam + b.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The bench problem: prediction, event times, chambers, and the loop from logs to a model."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Logs in which nothing is missing: coarse, slow, short, late ones, and clocks that are wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import patch

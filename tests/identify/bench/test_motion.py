@@ -1,7 +1,5 @@
 """Velocity from a noisy position, and the noise itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

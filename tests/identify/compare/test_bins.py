@@ -1,7 +1,5 @@
 """Bins of a comparison: p values of their errors, and q values over all of them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy import stats

@@ -1,7 +1,5 @@
 """compare on bench logs: locked, slow and random rigs, with and without chamber pressures."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

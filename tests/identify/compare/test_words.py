@@ -1,7 +1,5 @@
 """What `compare` says is said in words, not in column names."""
 
-from __future__ import annotations
-
 import pytest
 
 from kemba.identify.compare import words

@@ -1,7 +1,5 @@
 """The next test is designed for the rivals, and tells them apart on the twin as well."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

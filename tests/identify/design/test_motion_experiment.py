@@ -1,7 +1,5 @@
 """The next motion of a robot: a safe sway, judged by the filter, confirmed on the twin."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from unittest.mock import patch

@@ -1,7 +1,5 @@
 """Parameters that a linear estimate puts where none can be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which parts of the logs are left out: runs, or quarters of runs where one run alone shows it."""
 
-from __future__ import annotations
-
 from unittest.mock import patch
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A slow drift of a sensor is no force: a formula must explain more than a drift does."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import patch

@@ -1,7 +1,5 @@
 """How far nominal figures are off is told by the figures alone, not by how logs begin."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

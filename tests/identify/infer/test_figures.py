@@ -1,7 +1,5 @@
 """Figures that bend the prediction: fitted by bounded steps, where one linear step leads astray."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How much evidence the best of many formulas needs before it is more than chance."""
 
-from __future__ import annotations
-
 from unittest.mock import patch
 
 import numpy as np

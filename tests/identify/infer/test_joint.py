@@ -1,7 +1,5 @@
 """The joint estimate that is written: all effects together, what it says of how sure it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

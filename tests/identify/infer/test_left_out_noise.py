@@ -1,7 +1,5 @@
 """The noise of a block is what a fit to the other blocks leaves, not what is left after its own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

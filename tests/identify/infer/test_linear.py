@@ -1,7 +1,5 @@
 """Sums over blocks of rows: about another point as if they were made there."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.identify.infer.linear import condense, moved

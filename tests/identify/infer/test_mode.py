@@ -1,7 +1,5 @@
 """A little of many effects is no finding: every hypothesis is judged where it fits best."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

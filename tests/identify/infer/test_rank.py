@@ -1,7 +1,5 @@
 """Evidence, doubt and left-out data on a problem small enough to know the answer."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

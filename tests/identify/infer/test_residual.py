@@ -1,7 +1,5 @@
 """A pattern in what an answer leaves is a reason to doubt it, unless it is negligible or chance."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How many effects an answer names: those that left-out data need, and no more."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from toy_problem import Toy

@@ -4,8 +4,6 @@ On a linear problem nothing stands between them and the test but the test itself
 benchmarks/calibration.py asks the same of bench logs of the twin.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Scores of many hypotheses from one factor are those of each hypothesis alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Orifice chambers as a candidate: what their share means, and the model that is written."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Effects that are not named, or not for sure: what left-out data do not need, and what the time
 limit kept from being asked."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

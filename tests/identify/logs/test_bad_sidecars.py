@@ -1,7 +1,5 @@
 """Sidecars, units and single readings that cannot be: told with their place, never a traceback."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

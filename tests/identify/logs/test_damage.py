@@ -1,7 +1,5 @@
 """Broken logs: each kind of damage gets a clear refusal, or is borne; never a wrong answer."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Where the gate draws its lines: how many readings that cannot be, or are missing, it bears."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What the way in which logs were taken costs is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

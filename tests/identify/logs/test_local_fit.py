@@ -1,7 +1,5 @@
 """Polynomials fitted around each row are those of SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import savgol_filter

@@ -1,7 +1,5 @@
 """Foreign columns, kinds and groups of logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`check` of a log says what `compare` and `discover` would say."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Noise with a slow drift in it: its covariance, its density, and what it may not be taken for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal

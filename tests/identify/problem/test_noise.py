@@ -1,7 +1,5 @@
 """Whitening: what was made with a colour comes out white, from the first row on."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

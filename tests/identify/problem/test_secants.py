@@ -1,7 +1,5 @@
 """How far a parameter is moved for its column: a size, but a time by one row."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

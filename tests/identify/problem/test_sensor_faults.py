@@ -1,7 +1,5 @@
 """Sensor faults are written once: simulator, bench and robot identification read one class."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Annotated, ClassVar, Literal

@@ -1,7 +1,5 @@
 """Colour and drift of one sensor, told from autocovariances."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

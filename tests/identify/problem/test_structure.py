@@ -1,7 +1,5 @@
 """Structures that a search may build in: their parameters are found by the name of their kind."""
 
-from __future__ import annotations
-
 from kemba.identify.problem.structure import LINE, LineResistance, line_candidates
 from kemba.model import Model, load_model
 

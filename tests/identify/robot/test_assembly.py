@@ -1,7 +1,5 @@
 """How a machine is put together: its boom's lever and where its mass is, named from logs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

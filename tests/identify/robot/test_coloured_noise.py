@@ -1,7 +1,5 @@
 """Coloured noise of a robot's sensors: learnt, stated, and no reason to suspect the model."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Commands that are swapped or turned are named; without torques hips are left unknown."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from robot_logs import hops

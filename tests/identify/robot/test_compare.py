@@ -1,7 +1,5 @@
 """compare: nothing to say about a right model, the right place for a wrong one."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

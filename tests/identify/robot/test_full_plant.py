@@ -1,7 +1,5 @@
 """Logs of the full plant, whose air differs from the planning model's in everything."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Lengths found from feet that stand, and named by `discover`, before any force is blamed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sensor that is late by several rows: its delay is found whole."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

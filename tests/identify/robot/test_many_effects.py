@@ -1,7 +1,5 @@
 """Several effects at once in a robot: as many are named as the logs carry."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("numba")

@@ -1,7 +1,5 @@
 """Columns of robot logs with a wrong sign or zero are named, whatever the motion."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

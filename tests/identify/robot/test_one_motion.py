@@ -1,7 +1,5 @@
 """Logs of one kind of motion: three like jumps of a machine that lacks friction only."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Logs in which columns are mixed up are refused, and say why."""
 
-from __future__ import annotations
-
 import pytest
 
 pytest.importorskip("numba")

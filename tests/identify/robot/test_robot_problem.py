@@ -1,7 +1,5 @@
 """Robot residuals: white where the model is right, sharp where an effect is missing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Feet that slide: how rough the ground is shows in the force that they need, and only there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

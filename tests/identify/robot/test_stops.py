@@ -1,7 +1,5 @@
 """Stops and ground are read from noisy sensors: what rests there is read as resting there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.signal import lfilter

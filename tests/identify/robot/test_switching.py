@@ -1,7 +1,5 @@
 """Late valves are the same to simulator, bench and robot identification."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Expressions of quantities: units, names, two moments, values along a motion."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Moments of a task: names, shares, and the events of its contacts."""
 
-from __future__ import annotations
-
 import pytest
 
 from kemba.ocp.task.moments import events_of, share_of, spans

@@ -1,7 +1,5 @@
 """Words that stand for several requirements, and what is wrong with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
