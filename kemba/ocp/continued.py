@@ -34,7 +34,7 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
     status, sentence = verdict(task, certificate, new, answer.ending)
     facts = f"{sentence}, in {len(answer.phases)} phases of contacts and valves, from {origin.name}"
     cost, before = costs(model, new), costs(origin.model, origin.plan)
-    if cost[TORQUE] > Continuing.current().dear * before[TORQUE]:
+    if cost[TORQUE] > Continuing.dear * before[TORQUE]:
         times = f"{cost[TORQUE] / before[TORQUE]:.0f} times the squared torque"
         facts += f"; it takes {times} of {origin.name}, {origin.dear}"
     found = Plan(
@@ -60,7 +60,7 @@ def dear(found: Plan, before: float) -> bool:
     """Whether a plan costs so much more than `before`, by its task's own cost, that one from a
     guess is likely to cost less."""
     own = objective(found.model, found.task, found.requirements, found.trajectory)
-    return own > Continuing.current().most(before)
+    return own > Continuing.most(before)
 
 
 def from_scratch(found: Plan, why: str) -> Plan:

@@ -14,25 +14,11 @@ from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refined import refined
-from kemba.settings import Settings, setting
 
-
-class Sought(Settings):
-    """Where plans are sought."""
-
-    nodes: int = setting(
-        100, "1", "nodes at most on which a plan is sought from a guess",
-        "tuned: benchmarks/scaling.py --cold --refine none; on 200 a forward jump took 2.6 times "
-        "as long, on 400 one of three ended at the limit", decides=True,
-    )  # fmt: skip
-    step: float = setting(
-        7e-3, "s", "a longer motion is sought on more nodes, of steps as long as this",
-        "derived: 100 nodes of 0.7 s, the motion of those trials", decides=True,
-    )  # fmt: skip
-
-    def most(self, duration: float) -> int:
-        """The nodes at most on which a motion of `duration` [s] is sought."""
-        return max(self.nodes, ceil(duration / self.step))
+# Nodes at most on which a plan is sought from a guess, by benchmarks/scaling.py --cold --refine
+# none: on 200 a forward jump took 2.6 times as long, on 400 one of three ended at the limit.
+NODES = 100
+STEP = 7e-3  # s; a longer motion is sought on more nodes, of such steps: those of the trials
 
 
 def found_and_refined(planner: Planner, refused: bool) -> Plan:
@@ -52,7 +38,7 @@ def _from_fewer(planner: Planner) -> Plan | None:
     """The plan on the task's nodes from one on fewer; None where they are few, or where there is
     none or it cannot be solved on all of them. Where time is up before that, what there is."""
     task = planner.task
-    fewer = Sought.current().most(task.duration)
+    fewer = max(NODES, ceil(task.duration / STEP))
     if task.nodes <= fewer:
         return None
     coarse = replace(planner, task=task.model_copy(update={"nodes": fewer}))

@@ -33,7 +33,7 @@ from kemba.trajectory import Trajectory
 def grids(nodes: int) -> list[int]:
     """Numbers of nodes from coarse to fine, each about half of the next."""
     found = [nodes // 2, nodes]
-    while found[0] > Grids.current().finest:
+    while found[0] > Grids.finest:
         found.insert(0, found[0] // 2)
     return found
 
@@ -95,7 +95,7 @@ class Planner:
         for reduction in self.reductions() if self.start is not None else ():
             yield lambda r=reduction: self._continued(r)  # type: ignore[misc]
         for reduction in self.reductions():
-            if self.task.solver.coarse and nodes // 2 >= Grids.current().coarsest:
+            if self.task.solver.coarse and nodes // 2 >= Grids.coarsest:
                 yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
             yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 

@@ -11,7 +11,6 @@ from kemba.model import Model
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import Constraint, read_constraints
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -285,11 +284,9 @@ def plain(event: Event, n: int, m: int) -> Array:
     return whole
 
 
-class PolicySettings(Settings):
-    """How far a policy may go."""
-
-    latest: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
-    added: float = setting(5.0, "N.m", "torque that is added at most", CHOSEN, decides=True)
+# chosen by hand, no comparison kept
+LATEST = 8  # ms, by which an edge moves at most
+ADDED = 5.0  # N.m, torque that is added at most
 
 
 # deviations and corrections that cost the same: of the body's place [m], velocity [m/s], pitch

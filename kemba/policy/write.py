@@ -14,12 +14,14 @@ from kemba.plant.controller import PERIOD, Gains, hip_control, read_controller
 from kemba.plant.repeat import Sensors
 from kemba.policy.course import course_of
 from kemba.policy.modes import (
+    ADDED,
     BLIND,
     EDGE,
     FADING,
     FEWEST,
     JOINT,
     JOINT_RATE,
+    LATEST,
     PITCH,
     PITCH_RATE,
     PLACE,
@@ -31,7 +33,6 @@ from kemba.policy.modes import (
     Event,
     EventCourse,
     Flow,
-    PolicySettings,
     Saltation,
     Tick,
     plain,
@@ -245,7 +246,7 @@ def policy_arrays(
 
     `also`: columns of the executions that are measured as well, such as pressures.
     """
-    model, settings = course.hybrid.model, PolicySettings.current()
+    model = course.hybrid.model
     table, motion = read_controller(course.table), course.motion
     ticks, first = len(table), round(table.time[0] / PERIOD)
     start = round(motion.time[0] / PERIOD) - first  # a robot that falls begins later
@@ -283,8 +284,8 @@ def policy_arrays(
         "K_d": np.array(control.K_d),
         "limits": control.limits,
         "hip_gains": hips,
-        "most_torque": np.array(settings.added),
-        "most_shift": np.array(settings.latest),
+        "most_torque": np.array(ADDED),
+        "most_shift": np.array(LATEST),
         "window": np.array(WINDOW),
         **edges,
     }

@@ -18,7 +18,7 @@ from kemba.identify.logs.reading import read_logs
 from kemba.logs import load_map
 from kemba.model import build_model, load_spec
 from kemba.plotting.source import Machine, load_machine
-from kemba.policy.modes import PolicySettings
+from kemba.policy.modes import LATEST
 from kemba.quantity import to_si
 from kemba.report.charts import Book, Rows, Track, folded, gather, grid_of, pairs, plan_of, section
 from kemba.report.limits import energy_parts, event_table, limit_parts
@@ -44,7 +44,6 @@ from kemba.report.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs,
 from kemba.report.view import page_text, stage, write_page
 from kemba.runs import Run, load_run
 from kemba.scene import FLAT, Scene, scene_in
-from kemba.settings import Settings, setting
 from kemba.solve.verdict import EXECUTIONS
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
@@ -113,13 +112,9 @@ STEP = 5e-4  # s, between the commands that are compared
 TICK = 1e-3  # s, period of the controller, by which edges may be off
 
 
-class BelongingSettings(Settings):
-    """When the commands of a log are not those of a run."""
-
-    share: float = setting(
-        0.02, "1", "of the time in which valves are open, with another command than the run's",
-        "tuned: own logs of five simulated runs 0, jumps to 0.50 and 0.51 m 0.05", decides=True,
-    )  # fmt: skip
+# of the time in which valves are open: a log with other commands for longer is not one of the run;
+# own logs of five simulated runs 0, jumps to 0.50 and 0.51 m 0.05
+OTHER = 0.02
 
 
 @dataclass(frozen=True)
@@ -162,7 +157,7 @@ def _reason(log: Trajectory, run: Run, made_of: str, share: float | None) -> str
     other = made_of if made_of not in ("", run.path.resolve().name) else ""
     if share is None:
         return f"it was made of the run {other}" if other else ""
-    if share <= BelongingSettings.current().share:
+    if share <= OTHER:
         return ""
     made = f"; it was made of the run {other}" if other else ""
     return f"its valve commands are not those of controller.csv for {OPEN}{made}"
@@ -220,7 +215,7 @@ def _legs(table: Trajectory) -> tuple[str, ...]:
 
 def _moved(run: Run) -> float:
     """By how much [s] the run's feedback may move an edge."""
-    return 1e-3 * PolicySettings.current().latest if (run.path / POLICY).is_file() else 0.0
+    return 1e-3 * LATEST if (run.path / POLICY).is_file() else 0.0
 
 
 def _held(time: Array, command: Array, at: Array) -> Array:

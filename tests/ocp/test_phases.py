@@ -125,7 +125,7 @@ def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> Non
     assert found.trajectory is not None
     half = reduction_of(euler.model, euler.task, euler.requirements, euler.trajectory)
     x, node = arrays(euler.model, found.trajectory), euler.model.node
-    away, clear = ModeConstraints.current().away, ModeConstraints.current().clear
+    away, clear = ModeConstraints.away, ModeConstraints.clear
     for i, constraint in enumerate(read_constraints(euler.model, half)):
         gap = ca.Function("gap", [node.q], [constraint.gap]).map(len(x["q"]))
         values = np.array(gap(x["q"].T)).ravel()[1:]

@@ -31,7 +31,7 @@ def test_a_contact_that_opens_before_the_last_switch_keeps_its_order() -> None:
 
 def test_only_brief_and_small_hops_are_filled() -> None:
     touches = [OPEN, HELD, HELD, OPEN, OPEN, HELD, OPEN, OPEN, OPEN, HELD, OPEN]
-    reading = Reading.current()
+    reading = Reading
     gap = np.array([0.0, 0.0, 0.0, 1.0, 2.0, 0.0, 1.0, 1.0, 1.0, 0.0, 1.0]) * reading.shudder
     for hop, filled in ((reading.shudder, []), (reading.hop, [3, 4])):
         modes = np.array(touches)

@@ -32,41 +32,31 @@ from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
-from kemba.settings import Settings, setting
 from kemba.trajectory import Array, Trajectory
 
-TRIED = "tuned: jump and jump_forward with other heights, supplies, payloads and distances"
 
-
-class Continuing(Settings):
+# Those without a reason: tried on jump and jump_forward with other heights, supplies, payloads and
+# distances.
+class Continuing:
     """How an earlier plan is solved again for changed figures."""
 
-    iterations: int = setting(
-        60, "1", "iterations of each solve; those that converged took 16 to 46", TRIED, decides=True
-    )
-    patience: int = setting(
-        10, "1", "first iterations without a smaller violation, after which a solve is given up; "
-        "those that converged had none for 9 at most", TRIED, decides=True,
-    )  # fmt: skip
-    underway: float = setting(
-        0.5, "1", "scaled violation below which a solve is no longer given up for that", TRIED,
-        decides=True,
-    )  # fmt: skip
-    ease: float = setting(
-        1e3, "1", "how much rather impulses of the start change than its velocities, scaled",
-        "convention: a trajectory says nothing of impulses",
-    )  # fmt: skip
-    push: float = setting(
-        1e-3, "1", "distance from the bounds of such a start", TRIED, decides=True
-    )  # fmt: skip
-    dear: float = setting(
-        3.0, "1", "times the earlier plan's cost beyond which another minimum is likely",
-        "convention: more than such a change usually asks for",
-    )  # fmt: skip
+    iterations = 60  # of each solve; those that converged took 16 to 46
+    # first iterations without a smaller violation, after which a solve is given up; those that
+    # converged had none for 9 at most
+    patience = 10
+    underway = 0.5  # scaled violation below which a solve is no longer given up for that
+    # how much rather impulses of the start change than its velocities, scaled: a trajectory says
+    # nothing of impulses
+    ease = 1e3
+    push = 1e-3  # distance from the bounds of such a start
+    # times the earlier plan's cost beyond which another minimum is likely: more than such a change
+    # usually asks for
+    dear = 3.0
 
-    def most(self, before: float) -> float:
+    @classmethod
+    def most(cls, before: float) -> float:
         """The most that a plan may cost which is continued from one that cost `before`."""
-        return before + (self.dear - 1.0) * abs(before)
+        return before + (cls.dear - 1.0) * abs(before)
 
 
 class Mesh(NamedTuple):
@@ -140,7 +130,7 @@ class Continuation:
             return False
         before = objective(o.model, self.task, o.requirements, o.plan)
         cost = objective(self.model, self.task, self.requirements, new)
-        return cost <= Continuing.current().most(before)
+        return cost <= Continuing.most(before)
 
     def _solved(self, mesh: Mesh, reduction: Reduction) -> Refined:
         """The best plan in one solve: from the stages, and with the multipliers where they are
@@ -151,21 +141,21 @@ class Continuation:
         )
         program, x = refiner.build(mesh.phases, mesh.start, RADAU5)
         kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
-        x = with_impacts(program, x, Continuing.current().ease) if kept is None else kept
+        x = with_impacts(program, x, Continuing.ease) if kept is None else kept
         if self.origin.ticks:
             on_ticks(program, x)
         begin = Iterate(x)
         if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
             begin = mesh.stages.iterate(program, x)
-        settings, refining = Continuing.current(), Refining.current()
-        options = warm(min(settings.iterations, self.task.solver.max_iterations))
+        refining = Refining.current()
+        options = warm(min(Continuing.iterations, self.task.solver.max_iterations))
         mu = ipopt.last_barrier(refining.tol)
         if begin.lam_g is not None:
             # a multiplier is at least that of a bound at distance 1
-            options |= ipopt.warm(mu, settings.push, warm_start_mult_bound_push=mu)
+            options |= ipopt.warm(mu, Continuing.push, warm_start_mult_bound_push=mu)
         elif kept is not None:
             options |= ipopt.central(mu, refining.push)
-        stagnation = Stagnation(settings.patience, settings.underway, refining.slow)
+        stagnation = Stagnation(Continuing.patience, Continuing.underway, refining.slow)
         found = solve(program, begin, options, self.control, stagnation)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))

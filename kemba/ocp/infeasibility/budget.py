@@ -8,23 +8,12 @@ from kemba.ocp.infeasibility.diagnostic import Diagnostic, key, number, place, r
 from kemba.ocp.infeasibility.flight import AskedFlight, air_work, hip_power, leg_swing
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
-from kemba.settings import Settings, setting
 
 HEAVY = 0.2  # payload of all that is lifted, from which it is named as a cause
 FORWARD = 0.01  # m, way forward that needs friction of the ground: less is within the legs' swing
 
 
-class Checks(Settings):
-    """What refuses a task before solving, and what is given as a hint."""
-
-    strokes: int = setting(
-        3, "1", "pushes in one motion; a task that needs more energy is refused",
-        "convention: no planned motion has more", decides=True,
-    )  # fmt: skip
-    longest_step: float = setting(
-        0.05, "s", "longest step with which a valve can be timed within a push",
-        "convention: a push is only a few of these long", decides=True,
-    )  # fmt: skip
+STROKES = 3  # pushes in one motion, as none has more; a task that needs more energy is refused
 
 
 def budget_diagnostics(
@@ -86,7 +75,7 @@ def _energy(
     most = flight.z0 + air / (flight.mass * flight.fall)
     yield Diagnostic(
         "; ".join([*causes, f"{lifted} takes {lift:.0f} J, one stroke of the pistons {air:.0f} J"]),
-        lift > Checks.current().strokes * air + hip_power(model) * longest,
+        lift > STROKES * air + hip_power(model) * longest,
         (relax(document, flight.requirement, flight.height, most),),
         cause=bool(causes),
     )

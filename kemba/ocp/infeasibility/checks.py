@@ -9,7 +9,7 @@ from itertools import groupby
 from kemba.config import Document
 from kemba.config.document import Location
 from kemba.model import Model
-from kemba.ocp.infeasibility.budget import Checks, budget_diagnostics
+from kemba.ocp.infeasibility.budget import budget_diagnostics
 from kemba.ocp.infeasibility.diagnostic import (
     Diagnostic,
     key,
@@ -24,6 +24,9 @@ from kemba.ocp.infeasibility.pose import Gap, Poses
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.quantity import Quantity
+
+# s; longest step with which a valve can be timed within a push, which is only a few of these long
+LONGEST = 0.05
 
 
 def check_task(
@@ -162,13 +165,12 @@ def _reason(gaps: Sequence[Gap], document: Document) -> str:
 
 def coarse_grid(task: Task, flight: AskedFlight | None, document: Document) -> Iterator[Diagnostic]:
     """Steps too long to time a push."""
-    longest = Checks.current().longest_step
-    if flight is None or task.step <= longest:
+    if flight is None or task.step <= LONGEST:
         return
-    enough = int(-(-task.duration // longest))
+    enough = int(-(-task.duration // LONGEST))
     sentence = (
         f"{key('nodes', document)}: {task.nodes} over {task.duration:g} s make steps of "
         f"{1e3 * task.step:.0f} ms; a push by air needs steps of at most "
-        f"{1e3 * longest:.0f} ms, so at least {enough} nodes"
+        f"{1e3 * LONGEST:.0f} ms, so at least {enough} nodes"
     )
     yield Diagnostic(sentence, True)

@@ -22,7 +22,6 @@ from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import StageRows
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
-from kemba.settings import Settings, setting
 
 # What may be violated: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end", "clearance"))
@@ -33,21 +32,10 @@ CHEAP = 0.01  # factor on the task's costs: far below the price of slack
 ROOM = 0.1  # scaled slack of the start guess: off the bounds, in the range of answers
 
 
-class ElasticSolve(Settings):
-    """The solve in which requirements may be violated."""
-
-    nodes: int = setting(
-        40, "1", "of its grid at most; a coarse one is enough to say what is too much",
-        "convention: bounded, since it only explains", decides=True,
-    )  # fmt: skip
-    price: float = setting(
-        100.0, "1", "of one unit of scaled slack, beside a cost of 0.01 to 10",
-        "derived: above every cost of the task, so that no violation pays", decides=True,
-    )  # fmt: skip
-    short: float = setting(
-        0.05, "1", "scaled slack (5 mm, 0.6 deg) from which a requirement is out of reach",
-        "convention: above the grid's own error of some millimetres", decides=True,
-    )  # fmt: skip
+NODES = 40  # of its grid at most; a coarse one is enough to say what is too much
+PRICE = 100.0  # of one unit of scaled slack: above every cost of the task, so no violation pays
+# scaled slack (5 mm, 0.6 deg) from which a requirement is out of reach: above the grid's own error
+SHORT = 0.05
 
 
 class Elastic(Transcription):
@@ -112,7 +100,7 @@ class Elastic(Transcription):
         )
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
         z, _, _, at = self.local(requirement, rows.g, where, index)
-        price = ElasticSolve.current().price * (below + above) / len(where)
+        price = PRICE * (below + above) / len(where)
         z, at = ca.vertcat(z, below, above), np.hstack([at, shared])
         return RowBlock(z, rows.g, price, at), rows, where
 
@@ -166,7 +154,7 @@ def elastic(
     deadline = min(session.control.deadline, time.monotonic() + BUDGET)
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}
-    nodes = min(task.nodes, ElasticSolve.current().nodes)
+    nodes = min(task.nodes, NODES)
     found: Outcome | None = None
     for posed, soft in _tiers(task):
         if not sections & set(soft):
@@ -216,8 +204,7 @@ def _solve(program: Elastic, session: Session) -> Outcome | None:
     best = next((p for p in reversed(converged) if p.solved), None)
     if best is None:
         return None
-    short = ElasticSolve.current().short
-    return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > short))
+    return Outcome(program, best, tuple(g for g in program.given(best.Y) if g[2] > SHORT))
 
 
 def _first(schedule: Schedule, program: Elastic) -> Iterate | None:

@@ -10,22 +10,13 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.task.requirement import Requirement, quantity_expression
-from kemba.settings import Settings, setting
 
 STILL = 1e-6  # weight of squared rates, so that they are determined
 SPREAD = 3.0  # standard deviation of further starts, times the scale of a coordinate
 
 
-class PoseSearch(Settings):
-    """How poses are sought in which requirements hold together."""
-
-    tries: int = setting(
-        4, "1", "starts", "convention: the standing pose and three others", decides=True
-    )
-    met: float = setting(
-        1e-5, "SI", "slack below which a requirement counts as met",
-        "derived: 10 times the certificate's tolerance", decides=True,
-    )  # fmt: skip
+TRIES = 4  # starts: the standing pose and three others
+MET = 1e-5  # SI; slack below which a requirement is met: 10 times the certificate's tolerance
 
 
 def silent() -> dict[str, Any]:
@@ -100,21 +91,19 @@ class Poses:
         """
         may = {w.quantity.name for w in free}
         best: tuple[np.ndarray, np.ndarray] | None = None
-        for attempt in range(PoseSearch.current().tries):
+        for attempt in range(TRIES):
             found = self._solve(requirements, may, attempt)
             if found is not None:
                 slack = found[1]
                 if best is None or np.abs(slack).sum() < np.abs(best[1]).sum():
                     best = found
-                if np.abs(slack).max(initial=0.0) < PoseSearch.current().met:
+                if np.abs(slack).max(initial=0.0) < MET:
                     return []
         return None if best is None else self._told(best[1], requirements)
 
     def highest(self, requirements: Sequence[Requirement]) -> float | None:
         """The largest height of the body [m] in any pose in which `requirements` hold."""
-        found = [
-            self._solve(requirements, set(), k, lift=1.0) for k in range(PoseSearch.current().tries)
-        ]
+        found = [self._solve(requirements, set(), k, lift=1.0) for k in range(TRIES)]
         names = [c.name for c in self.model.mechanism.coordinates]
         heights = [float(f[0][names.index("body/z")]) for f in found if f is not None]
         return max(heights) if heights else None
@@ -162,7 +151,7 @@ class Poses:
     def _told(self, slack: np.ndarray, requirements: Sequence[Requirement]) -> list[Gap]:
         gaps = []
         for i, name in enumerate(self.names):
-            if abs(slack[i]) < PoseSearch.current().met:
+            if abs(slack[i]) < MET:
                 continue
             same = [w for w in requirements if w.quantity.name == name]
             if slack[i] > 0:

@@ -53,7 +53,7 @@ class Independent:
     def _leaves(self, equality: ca.Function, at: np.ndarray) -> bool:
         """Whether the gradient at a point (n,) leaves the span of those of the equalities so
         far."""
-        small, basis = ModeConstraints.current().independent, np.zeros((0, len(at)))
+        small, basis = ModeConstraints.independent, np.zeros((0, len(at)))
         for one in (*self.kept, equality):
             row = np.array(one(at)[1]).ravel()
             size = float(np.linalg.norm(row))

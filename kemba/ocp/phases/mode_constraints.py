@@ -38,10 +38,9 @@ def add_mode_constraints(program: PhaseProgram, start: Independent) -> None:
 def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
     """Open gaps stay positive; where one closes it is zero, and a foot moves downwards."""
     c, phases = program.columns, program.phases
-    settings = ModeConstraints.current()
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
-    near = max(settings.away, round(settings.away_share * program.nodes))
+    near = max(ModeConstraints.away, round(ModeConstraints.away_share * program.nodes))
     away = np.convolve(closed, np.ones(2 * near + 1), "same") < 1  # of a closed element
     g = view.of(constraint.gap) / LENGTH
     for clear in (False, True):
@@ -50,7 +49,7 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
             for e in np.flatnonzero(~closed & (away == clear))
             for stage in (c.stages[e][:-1] if e + 1 in closing else c.stages[e])
         ]
-        low = settings.clear / LENGTH if clear else 0.0
+        low = ModeConstraints.clear / LENGTH if clear else 0.0
         program.mode_constraint(i, "gap", view.z("q"), g, low, INF, apart)
     touching = [(closing[node], c.end(node)["q"]) for node in sorted(closing)]
     rate = view.of(constraint.rate) / SPEED
@@ -62,7 +61,7 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
         program.mode_constraint(i, "lands", view.z("q v"), own * rate, -soft / SPEED, INF, late)
     program.mode_constraint(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
     if constraint.friction is not None:
-        least = settings.lands if soft is None else min(settings.lands, soft / 2)
+        least = ModeConstraints.lands if soft is None else min(ModeConstraints.lands, soft / 2)
         low = -least / SPEED
         program.mode_constraint(i, "approach", view.z("q v"), rate, -INF, low, list(hits.values()))
 

@@ -80,7 +80,7 @@ def _settling(phases: Sequence[Phase]) -> list[Phase]:
 
 def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
     """Mode of a constraint at every row (rows,)."""
-    x, node, reading = arrays(model, plan), model.node, Reading.current()
+    x, node, reading = arrays(model, plan), model.node, Reading
     names = [constraint.gap]
     if constraint.friction is not None:
         names.append(constraint.friction.slip)
@@ -117,7 +117,7 @@ def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
     """Close a gap that opens by less than `hop` [m] for a step or two between two touches."""
     runs = _runs(modes)
     for (_, a), (b, _) in itertools.pairwise(runs):
-        if b - a <= Reading.current().brief and gap[a:b].max() < hop:
+        if b - a <= Reading.brief and gap[a:b].max() < hop:
             modes[a:b] = HELD
 
 

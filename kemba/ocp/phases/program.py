@@ -104,7 +104,7 @@ class PhaseProgram:
         return p > 0 and self.phases[p - 1].modes[i] == OPEN != self.phases[p].modes[i]
 
     def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        layout, c, elements = self.layout, self.columns, Elements.current()
+        layout, c = self.layout, self.columns
         lower, upper = np.full(c.size, -INF), np.full(c.size, INF)
 
         def put(index: np.ndarray, group: str) -> None:
@@ -114,7 +114,7 @@ class PhaseProgram:
         for g in STATE:
             put(c.first[g], g)
         states = layout.slices["s"]
-        vented = layout.lower[states] - elements.vented * layout.upper[states]
+        vented = layout.lower[states] - Elements.vented * layout.upper[states]
         for e, stages in enumerate(c.stages):
             for stage in stages:
                 for g in STATE:
@@ -123,8 +123,8 @@ class PhaseProgram:
                 self._forces(lower, upper, stage["lam"], self.phases[c.phase_of[e]].modes)
             put(c.u[e], "u")
         nominal = self.task.duration / self.nodes / layout.scale[layout.slices["h"]]
-        lower[c.h[:, 0]] = elements.shortest * nominal
-        upper[c.h[:, 0]] = elements.longest * nominal
+        lower[c.h[:, 0]] = Elements.shortest * nominal
+        upper[c.h[:, 0]] = Elements.longest * nominal
         for phase in self.phases:
             where = c.u[phase.first][[i - layout.slices["u"].start for i in layout.binary]]
             lower[where] = upper[where] = phase.valves
@@ -216,7 +216,7 @@ class PhaseProgram:
 
     def loosened(self, x: np.ndarray) -> np.ndarray:
         """x (size,) with slacks a little larger than every mode constraint needs there."""
-        x, row, leeway = x.copy(), 0, Elements.current().leeway
+        x, row = x.copy(), 0
         g = np.array(self.problem.g(x, [])).ravel()
         for part in self.parts:
             values = g[row : row + len(part.columns) * len(part.labels)]
@@ -228,7 +228,7 @@ class PhaseProgram:
                 (part.soft.below, part.lower - values),
             ):
                 if way is not None:
-                    x[way] = np.maximum(over, 0.0) + leeway
+                    x[way] = np.maximum(over, 0.0) + Elements.leeway
         return x
 
     @cached_property

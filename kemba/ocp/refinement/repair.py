@@ -97,11 +97,11 @@ def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> li
     `x` (size,): scaled variables.
     """
     h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
-    shortest = Elements.current().shortest * program.task.duration / program.nodes
+    shortest = Elements.shortest * program.task.duration / program.nodes
     phases = list(program.phases)
     for p in range(1, len(phases) - 1):
         around = (phases[p - 1].modes, phases[p + 1].modes)
-        brief = h[p] * phases[p].elements <= Elements.current().collapsed * shortest
+        brief = h[p] * phases[p].elements <= Elements.collapsed * shortest
         if brief and phases[p].modes not in around:
             phases[p] = replace(phases[p], modes=_nearest_modes(phases, p))
     found = merged(phases, marks)

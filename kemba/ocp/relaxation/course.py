@@ -13,7 +13,6 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from kemba.model import Model
-from kemba.ocp.relaxation.settings import Guess
 from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -25,6 +24,8 @@ LIFT = 0.05  # m; how high a foot swings over the line between its places
 FOLDED = 0.4  # leg length in flight, between retracted (0) and stretched (1)
 STANDS = 0.7  # the same where a flight begins or ends
 
+# leg length at take-off: short of the stretched knee, where virtual work is singular
+STRETCH = 0.92
 RISE = 0.7  # longest flight up to the apex, of the time before it: the push needs the rest
 LANDING = 0.3  # leg length after a landing, between retracted (0) and stretched (1)
 LEAST_FLIGHT = 0.05  # s; keeps the speed forward finite without a flight
@@ -94,7 +95,7 @@ def jump(
     x0, way = _from_to(requirements, "body/x")
     span = max(course.flight[1] - course.flight[0], LEAST_FLIGHT)
     x = x0 + way * np.clip((t - course.flight[0]) / span, 0.0, 1.0)
-    stretched = reach[0] + Guess.current().stretch * (reach[1] - reach[0])
+    stretched = reach[0] + STRETCH * (reach[1] - reach[0])
     feet = {}
     for leg, place in robot.legs.items():
         under = x + place.hip
@@ -117,7 +118,7 @@ def body_course(
     `ground` = height [m] where it starts and where it ends."""
     first, last = ground
     low, high = reach[0] + first, reach[1] + first
-    top = low + Guess.current().stretch * (high - low)
+    top = low + STRETCH * (high - low)
     lands_at, bent = top + last - first, low + LANDING * (top - low) + last - first
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)

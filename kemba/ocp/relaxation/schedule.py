@@ -106,7 +106,7 @@ def move(schedule: Schedule, start: Iterate, eps: float | None = None, **more: A
 
 def _released(valves: dict[int, np.ndarray]) -> dict[int, Bounds]:
     """Bounds of the valve columns: free near their switches, fixed elsewhere."""
-    reach, bounds = Grids.current().reach, {}
+    reach, bounds = Grids.reach, {}
     for column, u in valves.items():
         near = np.zeros(len(u), dtype=bool)
         for k in np.flatnonzero(np.diff(u)):

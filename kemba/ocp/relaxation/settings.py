@@ -99,21 +99,10 @@ class Ends(Settings):
     )
 
 
-class Grids(Settings):
+class Grids:
     """On which grids valves are sought, and how far their switches move where a plan of half a
-    robot becomes one of the whole."""
+    robot becomes one of the whole; chosen by hand, no comparison kept."""
 
-    reach: int = setting(4, "1", "nodes by which a switch may move", CHOSEN, decides=True)
-    coarsest: int = setting(24, "1", "nodes of the coarsest grid", CHOSEN, decides=True)
-    finest: int = setting(
-        80, "1", "nodes of the finest grid on which valves are sought", CHOSEN, decides=True
-    )
-
-
-class Guess(Settings):
-    """The automatic start guess."""
-
-    stretch: float = setting(
-        0.92, "1", "leg length at take-off, between retracted (0) and stretched (1)",
-        "convention: short of the stretched knee, where virtual work is singular", decides=True,
-    )  # fmt: skip
+    reach = 4  # nodes by which a switch may move
+    coarsest = 24  # nodes of the coarsest grid
+    finest = 80  # nodes of the finest grid on which valves are sought
