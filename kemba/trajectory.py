@@ -141,6 +141,7 @@ def _is_number(cell: str) -> bool:
 
 
 TIME = "time [s]"
+SAME_TIME = 1e-9  # s; times closer than this are one
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
@@ -246,8 +247,22 @@ class Trajectory:
         """The same with columns, given by header, added or replaced."""
         replaced = {Quantity.from_header(header).name for header in columns}
         kept = self.select(name for name in self.names if name not in replaced)
-        own = dict(zip(kept.headers, (kept[name] for name in kept.names), strict=True))
-        return Trajectory(self.time, {**own, **columns}, self.meta)
+        return Trajectory(self.time, {**kept.columns, **columns}, self.meta)
+
+    def rows(self, chosen: Any) -> Trajectory:
+        """The rows that an index, a slice or a mask (n,) chooses."""
+        columns = {header: values[chosen] for header, values in self.columns.items()}
+        return Trajectory(self.time[chosen], columns, self.meta)
+
+    def at_times(self, time: Array) -> Trajectory:
+        """The same columns at other times (n,) [s]."""
+        return Trajectory(time, self.columns, self.meta)
+
+    def held(self, name: str, times: Array) -> Array:
+        """A column at `times` of any shape [s], where each row holds until the next and the first
+        holds before."""
+        row = np.searchsorted(self.time, times + SAME_TIME, side="right") - 1
+        return np.asarray(self[name][np.maximum(row, 0)])
 
     def interpolate(self, times: Any, hold: Collection[str] = ()) -> Trajectory:
         """The columns at `times` (m,) in s, linear in between; those in `hold` keep their value.
@@ -259,8 +274,7 @@ class Trajectory:
         times = np.asarray(times, dtype=float)
         held = np.clip(np.searchsorted(self.time, times, side="right") - 1, 0, None)
         columns = {}
-        for header, name in zip(self.headers, self.names, strict=True):
-            values = self[name]
+        for (name, values), header in zip(self.items(), self.headers, strict=True):
             columns[header] = values[held] if name in hold else np.interp(times, self.time, values)
         return Trajectory(times, columns, self.meta)
 

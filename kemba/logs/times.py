@@ -155,12 +155,12 @@ def _joined_rows(log: Trajectory) -> Trajectory:
     first = np.concatenate([[True], steps > 0])
     row = np.cumsum(first) - 1
     columns = {}
-    for header, name in zip(log.headers, log.names, strict=True):
-        good = np.isfinite(log[name])
+    for header, values in log.columns.items():
+        good = np.isfinite(values)
         if len(np.unique(row[good])) < good.sum():
             return log
         columns[header] = np.full(int(first.sum()), np.nan)
-        columns[header][row[good]] = log[name][good]
+        columns[header][row[good]] = values[good]
     return Trajectory(log.time[first], columns, log.meta)
 
 

@@ -12,9 +12,7 @@ from kemba.effects.pneumatics import switching
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
 from kemba.plant.kernel.machine import Array
-from kemba.trajectory import Trajectory
-
-SAME_TIME = 1e-9  # s; times closer than this are one
+from kemba.trajectory import SAME_TIME, Trajectory
 
 Sense = Mapping[str, float]
 Feedback = Callable[[float, Sense], Mapping[str, float]]

@@ -11,11 +11,11 @@ from kemba.effects.mechanics.hip import Motor
 from kemba.errors import KembaError
 from kemba.events import STANDS
 from kemba.model import Model
-from kemba.plant.commands import SAME_TIME, Commands, JointControl, Profile
+from kemba.plant.commands import Commands, JointControl, Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.replay import Replay, first_row, judge
 from kemba.plant.simulate import Condition, Simulated, lowest_foot, run_many, simulate_one
-from kemba.trajectory import Trajectory
+from kemba.trajectory import SAME_TIME, Trajectory
 
 PERIOD = 1e-3  # s; the controller's rate (paper, IV-B)
 
@@ -118,9 +118,8 @@ def later(done: Simulated, begin: float) -> Simulated:
     if not begin:
         return done
     t = done.trajectory
-    columns = {h: t[n] for h, n in zip(t.headers, t.names, strict=True)}
     impacts = tuple(replace(impact, time=impact.time + begin) for impact in done.impacts)
-    return Simulated(Trajectory(t.time + begin, columns, t.meta), impacts)
+    return Simulated(t.at_times(t.time + begin), impacts)
 
 
 def read_controller(source: Trajectory | str | Path) -> Trajectory:
@@ -132,9 +131,8 @@ def read_controller(source: Trajectory | str | Path) -> Trajectory:
     if not isinstance(source, Trajectory):
         path = Path(source)
         source = Trajectory.read(path / "controller.csv" if path.is_dir() else path)
-    columns = {h: source[n] for h, n in zip(source.headers, source.names, strict=True)}
     begin = -float(source.meta.get("lead", -source.time[0]))
-    return Trajectory(source.time - source.time[0] + begin, columns, source.meta)
+    return source.at_times(source.time - source.time[0] + begin)
 
 
 def hip_control(model: Model, table: Trajectory, gains: Gains) -> JointControl:

@@ -16,12 +16,12 @@ import numpy as np
 
 from kemba.errors import KembaError, suggest
 from kemba.model import Model
-from kemba.plant.commands import SAME_TIME, Commands, delayed
+from kemba.plant.commands import Commands, delayed
 from kemba.plant.equations import equations_of, share_equations
 from kemba.plant.kernel.machine import LONGEST_STEP, Array
 from kemba.plant.record import Impact, trajectory
 from kemba.stopwatch import Tell
-from kemba.trajectory import Trajectory
+from kemba.trajectory import SAME_TIME, Trajectory
 
 if TYPE_CHECKING:
     from kemba.plant.player import Player

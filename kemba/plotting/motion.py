@@ -226,10 +226,10 @@ def plot_bench(sources: Sequence[Source], figure: Figure | None = None) -> Figur
 def _joined(source: Source) -> Source:
     """The source with a vessel's readings joined by lines: its channels are read by turns."""
     log, joined = source.trajectory, {}
-    for header, name in zip(log.headers, log.names, strict=True):
-        good = np.isfinite(log[name])
-        if name.startswith("vessel/") and good.any():
-            joined[header] = np.interp(log.time, log.time[good], log[name][good])
+    for header, values in log.columns.items():
+        good = np.isfinite(values)
+        if header.startswith("vessel/") and good.any():
+            joined[header] = np.interp(log.time, log.time[good], values[good])
     return replace(source, trajectory=log.with_columns(joined)) if joined else source
 
 

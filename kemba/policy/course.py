@@ -208,11 +208,9 @@ def course_of(model: Model, table: Trajectory) -> EventCourse:
     builder = Builder(hybrid, motion, dict(commands.profiles), acting, commands.feedback, begin)
     events = tuple(builder.events(clock, impacts))
     rows = np.flatnonzero(among(motion.time, clock))
-    shown = {h: motion[n][rows] for h, n in zip(motion.headers, motion.names, strict=True)}
-    shown_motion = Trajectory(motion.time[rows] + begin, shown)
-    return EventCourse(
-        hybrid, table, shown_motion, builder.x[rows], events, commands.feedback.joints
-    )
+    shown = motion.rows(rows)
+    shown = shown.at_times(shown.time + begin)
+    return EventCourse(hybrid, table, shown, builder.x[rows], events, commands.feedback.joints)
 
 
 def _changes(hybrid: Hybrid, motion: Trajectory) -> Array:

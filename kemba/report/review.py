@@ -46,7 +46,7 @@ from kemba.runs import Run, load_run
 from kemba.scene import FLAT, Scene, scene_in
 from kemba.solve.verdict import EXECUTIONS
 from kemba.stopwatch import Tell, silent
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 
 def certificate_tables(answer: Facts) -> Iterable[str]:
@@ -168,17 +168,16 @@ def other_commands(log: Trajectory, table: Trajectory, moved: float = 0.0) -> fl
     table; None without commands. Edges may be off by a sample, a tick and `moved` [s]."""
     shown = in_plans_clock(log, table)
     names = [name for name in table.names if "/valve/" in name and name in shown]
-    sent = table.time + start_of(table) - table.time[0]
-    begin, end = max(sent[0], shown.time[0]), min(sent[-1], shown.time[-1])
+    sent = table.at_times(table.time + start_of(table) - table.time[0])
+    begin, end = max(sent.time[0], shown.time[0]), min(sent.time[-1], shown.time[-1])
     if not names or end <= begin:
         return None
     grid = np.arange(begin, end, STEP)
     off = moved + TICK + float(np.median(np.diff(shown.time)))
     wrong, is_open = 0, 0
     for name in names:
-        ours = _held(sent, table[name], grid)
-        theirs = _held(shown.time, shown[name], grid)
-        near = _held(sent, table[name], grid[:, None] + np.linspace(-off, off, 9))
+        ours, theirs = sent.held(name, grid) > 0.5, shown.held(name, grid) > 0.5
+        near = sent.held(name, grid[:, None] + np.linspace(-off, off, 9)) > 0.5
         wrong += int(np.sum(np.where(theirs, ~near.any(axis=1), near.all(axis=1))))
         is_open += int(np.sum(np.logical_or(ours, theirs)))
     return wrong / is_open if is_open else None
@@ -216,12 +215,6 @@ def _legs(table: Trajectory) -> tuple[str, ...]:
 def _moved(run: Run) -> float:
     """By how much [s] the run's feedback may move an edge."""
     return 1e-3 * LATEST if (run.path / POLICY).is_file() else 0.0
-
-
-def _held(time: Array, command: Array, at: Array) -> Array:
-    """Whether a valve is commanded on at times of any shape; each row holds until the next."""
-    row = np.clip(np.searchsorted(time, at + 1e-9, side="right") - 1, 0, None)
-    return np.asarray(np.nan_to_num(command)[row] > 0.5)
 
 
 PLANNING = "planning"

@@ -123,12 +123,6 @@ def entry(past: Past, facts: dict[str, Any]) -> dict[str, Any]:
     return {ENTRY: own, "learnt_before": past.history}
 
 
-def sent(table: Trajectory, time: Array, name: str) -> Array:
-    """A valve command of a table at times (n,) [s] of its clock."""
-    row = np.searchsorted(table.time, time + 1e-9, side="right") - 1
-    return np.asarray(table[name][np.clip(row, 0, len(table) - 1)])
-
-
 def _round(run: Run) -> int:
     return int(run.manifest.get(ENTRY, {}).get("round", 0))
 
@@ -154,8 +148,7 @@ def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
         what = f"its valve commands differ from the run's in {miss:.0%} of the rows"
         hint = "give the run that was executed, or logs that begin where its controller.csv begins"
         raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[place].path}", hint)
-    columns = {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}
-    return place, Trajectory(time, columns, log.meta)
+    return place, log.at_times(time)
 
 
 def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
@@ -163,7 +156,7 @@ def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
     names = [name for name in table.names if "/valve/" in name]
     if any(name not in log for name in names):
         return 1.0
-    return max(float(np.mean(sent(table, time, n) != np.round(log[n]))) for n in names)
+    return max(float(np.mean(table.held(n, time) != np.round(log[n]))) for n in names)
 
 
 def as_executed(model: str, task: Task, path: Path) -> str:
@@ -430,8 +423,7 @@ def _corrected(found: Round, task: Task, folder: RunFolder) -> Round:
     aimed = Aim(model, machine, plan, found.correction).corrected(plain)
     if any(k for edges in aimed.moved.values() for k in edges):
         plain.write(folder / PLAIN)
-        columns = {h: aimed.table[n] for h, n in zip(plain.headers, plain.names, strict=True)}
-        Trajectory(plain.time, columns, plain.meta).write(folder / "controller.csv")
+        aimed.table.at_times(plain.time).write(folder / "controller.csv")
     target = flight_of(plan, machine)
     reached = {
         "expected_apex_m": aimed.expected.apex,

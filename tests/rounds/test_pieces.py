@@ -27,7 +27,7 @@ from kemba.rounds.correction import (
 )
 from kemba.rounds.outcome import ExpectedApex, band_about
 from kemba.rounds.page import verdict_of
-from kemba.rounds.round import Round, as_executed, entry, past_of, sent
+from kemba.rounds.round import Round, as_executed, entry, past_of
 from kemba.trajectory import Trajectory
 
 
@@ -107,7 +107,7 @@ def logged(run: Path, name: str, begin: float = -0.006) -> Trajectory:
     """A log whose first row has the time `begin` [s]."""
     table = Trajectory.read(run / "controller.csv")
     time = np.arange(-0.006, 0.189, 1.03e-3)
-    valve = sent(table, time, "front/valve/extend")
+    valve = table.held("front/valve/extend", time)
     log = Trajectory(time - time[0] + begin, {"front/valve/extend [1]": valve})
     log.write(run / name)
     log.meta["path"] = str(run / name)

@@ -90,9 +90,7 @@ def looked_at(logs: Sequence[Trajectory]) -> list[Trajectory]:
     """The first logs, as many as are searched for a drift; the last of them is cut."""
     found, left = [], ClockSettings.rows
     for log in logs:
-        kept = slice(0, left)
-        columns = {h: log[n][kept] for h, n in zip(log.headers, log.names, strict=True)}
-        found.append(Trajectory(log.time[kept], columns, log.meta) if len(log) > left else log)
+        found.append(log.rows(slice(0, left)))
         left -= len(log)
         if left < GateSettings.fewest:
             break

@@ -20,8 +20,7 @@ def in_plans_clock(log: Trajectory, table: Trajectory) -> Trajectory:
         for pair in _pairs(rises(log.time, log[name]), rises(sent, table[name]))
     ]
     shift = float(np.median([b - a for a, b in pairs])) if pairs else sent[0] - log.time[0]
-    columns = {h: log[n] for h, n in zip(log.headers, log.names, strict=True)}
-    return Trajectory(log.time + shift, columns, log.meta)
+    return log.at_times(log.time + shift)
 
 
 def start_of(table: Trajectory) -> float:

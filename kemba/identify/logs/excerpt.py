@@ -14,14 +14,8 @@ FINEST = 7e-4  # rows closer than this are thinned [s]: below it, two rows fit i
 STEP = 1e-3
 
 
-def excerpts(
-    logs: Sequence[Trajectory], rows: int | None = None
-) -> tuple[list[Trajectory], list[str]]:
-    """The logs, thinned and cut into pieces where they are too long, and remarks about it.
-
-    `rows`: largest number of rows of all logs together; the setting where it is not given.
-    """
-    rows = ROWS if rows is None else rows
+def excerpts(logs: Sequence[Trajectory]) -> tuple[list[Trajectory], list[str]]:
+    """The logs, thinned and cut into pieces where they are too long, and remarks about it."""
     found, remarks = [], []
     for log in logs:
         thin = thinned(log)
@@ -29,9 +23,9 @@ def excerpts(
             remarks.append(f"{log.meta['name']}: {len(thin)} of {len(log)} rows are used")
         found.append(thin)
     total = sum(len(log) for log in found)
-    if total <= rows:
+    if total <= ROWS:
         return found, remarks
-    share = rows / total
+    share = ROWS / total
     pieces = [piece for log in found for piece in cut(log, share)]
     remarks.append(
         f"{total} rows are more than a search needs: {len(pieces)} pieces of {PIECE:g} s are used"
@@ -49,8 +43,7 @@ def thinned(log: Trajectory) -> Trajectory:
     for name in log.names:
         if "valve/" in name:
             chosen[1:] |= np.diff(held(log[name])) != 0
-    columns = {h: log[n][chosen] for h, n in zip(log.headers, log.names, strict=True)}
-    return Trajectory(log.time[chosen], columns, log.meta)
+    return log.rows(chosen)
 
 
 def cut(log: Trajectory, share: float) -> list[Trajectory]:
@@ -65,10 +58,9 @@ def cut(log: Trajectory, share: float) -> list[Trajectory]:
 
 def part(log: Trajectory, start: float, end: float) -> Trajectory:
     """The rows of a log between two times [s]."""
-    rows = (log.time >= start) & (log.time < end)
-    columns = {h: log[n][rows] for h, n in zip(log.headers, log.names, strict=True)}
-    name = f"{log.meta['name']}@{start:.1f}s"
-    return Trajectory(log.time[rows], columns, {**log.meta, "name": name})
+    piece = log.rows((log.time >= start) & (log.time < end))
+    piece.meta["name"] = f"{log.meta['name']}@{start:.1f}s"
+    return piece
 
 
 def held(values: Array) -> Array:

@@ -191,10 +191,9 @@ def _without_absurd(log: Trajectory) -> Trajectory:
 
     So are the few that this channel cannot have, where the gate tolerates so few of them.
     """
-    columns = {h: log[name] for h, name in zip(log.headers, log.names, strict=True)}
-    wild = {h: _wild(n, log[n]) for h, n in zip(log.headers, log.names, strict=True)}
-    broken = {h: np.where(wild[h], np.nan, columns[h]) for h in columns if wild[h].any()}
-    return log.with_columns(broken) if broken else log
+    wild = {name: _wild(name, values) for name, values in log.items()}
+    broken = {name: np.where(wild[name], np.nan, log[name]) for name in wild if wild[name].any()}
+    return log.with_columns({f"{n} [{log.unit(n)}]": y for n, y in broken.items()})
 
 
 def _wild(name: str, y: Array) -> np.ndarray:

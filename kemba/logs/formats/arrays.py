@@ -28,10 +28,10 @@ BROKEN = (ValueError, TypeError, KeyError, EOFError, NotImplementedError, zipfil
 
 def write_npz(trajectory: Trajectory, path: Path) -> None:
     """One array per column by name, and `units` and `meta` (JSON)."""
-    values = {name: trajectory[name] for name in trajectory.names}
     units = np.array([trajectory.unit(name) for name in trajectory.names])
     meta = np.array(json.dumps(plain(trajectory.meta)))
-    content: dict[str, Any] = {"time": trajectory.time, "units": units, "meta": meta, **values}
+    content: dict[str, Any] = {"time": trajectory.time, "units": units, "meta": meta}
+    content |= dict(trajectory.items())
     with atomic_path(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **content)
 
@@ -58,8 +58,7 @@ def read_npz(path: Path) -> Recording:
 
 def write_json(trajectory: Trajectory, path: Path) -> None:
     """Columns by header, and the metadata."""
-    pairs = zip(trajectory.headers, trajectory.names, strict=True)
-    columns = {TIME: trajectory.time, **{header: trajectory[name] for header, name in pairs}}
+    columns = {TIME: trajectory.time, **trajectory.columns}
     write_json_file(path, {"columns": columns, "meta": trajectory.meta})
 
 

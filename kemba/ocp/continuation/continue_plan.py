@@ -267,17 +267,13 @@ def _shared(weights: Sequence[float], total: int) -> list[int] | None:
 def _resampled(plan: Trajectory, phases: Sequence[Phase], counts: Sequence[int]) -> Trajectory:
     """The plan at even steps in each phase. Rows of a phase are those after its first node: there
     velocities are from before an impact, inputs and forces those of the phase before."""
-    clocks, columns = [plan.time[:1]], {h: [plan[n][:1]] for h, n in _columns(plan)}
+    clocks, columns = [plan.time[:1]], {h: [values[:1]] for h, values in plan.columns.items()}
     for phase, count in zip(phases, counts, strict=True):
         t, rows = plan.time, slice(phase.first + 1, phase.last + 1)
         clock = t[phase.first] + (t[phase.last] - t[phase.first]) * np.arange(1, count + 1) / count
         clock[-1] = t[phase.last]
         clocks.append(clock)
-        for header, name in _columns(plan):
-            columns[header].append(np.interp(clock, t[rows], plan[name][rows]))
+        for header, values in plan.columns.items():
+            columns[header].append(np.interp(clock, t[rows], values[rows]))
     joined: dict[str, Array] = {header: np.concatenate(parts) for header, parts in columns.items()}
     return Trajectory(np.concatenate(clocks), joined, plan.meta)
-
-
-def _columns(plan: Trajectory) -> list[tuple[str, str]]:
-    return list(zip(plan.headers, plan.names, strict=True))
