@@ -81,15 +81,13 @@ def with_moved(
     for group, by in zip(groups, ticks, strict=True):
         for name, k in group:
             edges[name][k] += int(by)
-    if not all(_possible(own, len(table)) for own in edges.values()):
-        return None
-    columns: dict[str, Array] = {}
-    for header, name in zip(table.headers, table.names, strict=True):
-        columns[header] = table[name]
-        if name in edges:
-            columns[header] = np.zeros(len(table))
-            for i, tick in enumerate(edges[name]):
-                columns[header][tick:] = float(i % 2 == 0)
+    for own in edges.values():
+        if not all(0 <= tick < len(table) for tick in own) or not np.all(np.diff(own) > 0):
+            return None
+    columns = table.columns
+    for name, own in edges.items():
+        switched = np.isin(np.arange(len(table)), own)
+        columns[f"{name} [{table.unit(name)}]"] = np.asarray(np.cumsum(switched) % 2.0)
     return Trajectory(table.time, columns, table.meta)
 
 
@@ -100,10 +98,6 @@ def neighbours(table: Trajectory) -> Iterator[Trajectory]:
             moved = with_moved(table, [group], [tick])
             if moved is not None:
                 yield moved
-
-
-def _possible(ticks: list[int], rows: int) -> bool:
-    return all(0 <= tick < rows for tick in ticks) and bool(np.all(np.diff(ticks) > 0))
 
 
 class RetimingSettings(Settings):
@@ -154,15 +148,7 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
     """
     run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
     search = Roundings(run, RetimingSettings.current().executions)
-    best = search.tried(table)
-    last, before = _last(model, plan), np.inf
-    while 1.0 < best.error < before and search.left > 0:
-        before = best.error
-        for edges in (shared_edges(table), single_edges(table)):
-            groups = [group for group in edges if _earliest(table, group) < last]
-            if groups:
-                best = search.around(best, groups)
-    return best
+    return search.best(table, _last(model, plan))
 
 
 @dataclass
@@ -171,6 +157,18 @@ class Roundings:
 
     run: Callable[[Trajectory], ExecutedTable]
     left: int
+
+    def best(self, table: Trajectory, last: float) -> ExecutedTable:
+        """The table, or the best of those with edges some ticks away; edges after `last` [s]
+        stay."""
+        best, before = self.tried(table), np.inf
+        while 1.0 < best.error < before and self.left > 0:
+            before = best.error
+            for edges in (shared_edges(table), single_edges(table)):
+                groups = [group for group in edges if not _earliest(table, group) > last]
+                if groups:
+                    best = self.around(best, groups)
+        return best
 
     def tried(self, table: Trajectory) -> ExecutedTable:
         """A table, executed."""

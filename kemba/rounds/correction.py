@@ -15,15 +15,7 @@ from kemba.events import MEASURED, read
 from kemba.model import Model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
-from kemba.plant.retiming import (
-    FALLEN,
-    ExecutedTable,
-    Group,
-    Roundings,
-    edges_of,
-    shared_edges,
-    single_edges,
-)
+from kemba.plant.retiming import FALLEN, ExecutedTable, Roundings, edges_of
 from kemba.plotting.source import Machine
 from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
@@ -177,13 +169,7 @@ class Aim:
         wanted = flight_of(self.plan, self.machine)
         turn, must = self._limits(first, rest, wanted)
         run = partial(self._tried, first=first, rest=rest, wanted=wanted, turn=turn, must=must)
-        search = Roundings(run, AimSettings.executions)
-        best, before = search.tried(first), inf
-        while 1.0 < best.error < before and search.left > 0:
-            before = best.error
-            for edges in (shared_edges(first), single_edges(first)):
-                groups = [group for group in edges if not _begins(first, group) > wanted.touchdown]
-                best = search.around(best, groups) if groups else best
+        best = Roundings(run, AimSettings.executions).best(first, wanted.touchdown)
         return Aimed(best.table, self.expected(best.table, rest)[0], _moved(first, best.table))
 
     def _limits(self, table: Trajectory, rest: float, wanted: FlownJump) -> tuple[float, bool]:
@@ -221,18 +207,13 @@ class Aim:
         signed /= [AimSettings.apex, AimSettings.touchdown, turn]
         if not isfinite(wanted.touchdown):
             signed[1:] = 0.0
-        far = not _within(first, table, AimSettings.current().moved)
+        moved = _moved(first, table).values()
+        far = any(abs(k) > AimSettings.current().moved for ticks in moved for k in ticks)
         if far or (must and not lands) or not np.isfinite(signed).all():
             return ExecutedTable(table, None, signed, FALLEN)
         turns = abs(signed[2]) > 1.0 + 1e-9
         error = float(np.abs(signed[:2]).max())
         return ExecutedTable(table, None, signed, error + (TURNED if turns else 0.0))
-
-
-def _begins(table: Trajectory, group: Group) -> float:
-    """When [s] the first edge of a group comes."""
-    edges = edges_of(table)
-    return float(min(table.time[edges[name][k]] for name, k in group))
 
 
 def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:
@@ -242,7 +223,3 @@ def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:
         name: [new - old for new, old in zip(after[name], ticks, strict=True)]
         for name, ticks in edges_of(first).items()
     }
-
-
-def _within(first: Trajectory, table: Trajectory, most: int) -> bool:
-    return all(abs(k) <= most for edges in _moved(first, table).values() for k in edges)
