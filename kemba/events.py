@@ -161,11 +161,11 @@ def contacts(
         return Span(begin, end, took >= LASTS * weight)
 
     firm = np.zeros(len(time), dtype=bool)
-    for i, j in _runs(down):
+    for i, j in runs(down):
         firm[i:j] = span(i, j).firm
     solid = bridged(firm, low)
     brief = bridged(down & ~solid, low & ~solid)  # grazes, and what they make together
-    return sorted((span(*rows) for part in (solid, brief) for rows in _runs(part)), key=_first)
+    return sorted((span(*rows) for part in (solid, brief) for rows in runs(part)), key=_first)
 
 
 def _first(span: Span) -> float:
@@ -187,13 +187,13 @@ def bridged(down: Mask, low: Mask) -> Mask:
     """`down` (n,) with each break filled in which `low` (n,) holds all the time, also one between a
     contact and an end of the motion."""
     found = down.copy()
-    for i, j in _runs(~down):
+    for i, j in runs(~down):
         if low[i:j].all() and j - i < len(down):
             found[i:j] = True
     return np.asarray(found)
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
+def runs(mask: Mask) -> list[tuple[int, int]]:
     """First row and the row after the last of every run of a mask (n,)."""
     edges = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0))
     return [(int(i), int(j)) for i, j in edges.reshape(-1, 2)]

@@ -14,7 +14,7 @@ from kemba.config import load_yaml
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
 from kemba.errors import KembaError
-from kemba.events import STAYS, bridged, gap
+from kemba.events import STAYS, bridged, gap, runs
 from kemba.logs import ColumnMap, open_log
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
@@ -60,8 +60,7 @@ class Source:
         """Start and end [s] of every time in which the rows `active` (n,) hold without a break."""
         time = self.trajectory.time
         on = active[1:] if self.plan else active[:-1]
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], on.astype(bool), [False]])))
-        return [(time[a], time[b]) for a, b in edges.reshape(-1, 2)]
+        return [(time[a], time[b]) for a, b in runs(on.astype(bool))]
 
 
 def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 from kemba.effects.mechanics.ground import Contact
 from kemba.effects.mechanics.hip import Motor
 from kemba.effects.pneumatics.flow import ATMOSPHERE, GAS, TEMPERATURE
+from kemba.events import runs
 from kemba.identify.problem.noise import difference_sigma
 from kemba.mechanism import Cylinder
 from kemba.model import Model
@@ -108,9 +109,8 @@ def slides(track: Track, leg: str, stands: Mask, foot: Array | None) -> float:
         return float(np.trapezoid(np.where(stands, t[f"{leg}/foot/slip"], 0.0), t.time))
     if foot is None or "body/x" not in t:
         return float("nan")
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], stands, [False]]).astype(int)))
     way = 0.0
-    for a, b in edges.reshape(-1, 2):
+    for a, b in runs(stands):
         place = foot[a:b][np.isfinite(foot[a:b])]
         few = max(1, len(place) // 5)
         if len(place) > 2:

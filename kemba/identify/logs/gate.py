@@ -6,6 +6,7 @@ import numpy as np
 
 from kemba.effects.sensors import CHANNELS
 from kemba.errors import ConfigErrors, KembaError, suggest
+from kemba.events import runs
 from kemba.identify.logs.reading import OWN_RIGS, GateSettings, legs_of, needed, range_of
 from kemba.identify.problem.noise import difference_sigma
 from kemba.logs.times import rate_missing
@@ -53,9 +54,10 @@ def check_logs(logs: Sequence[Trajectory]) -> list[str]:
 
 def _faults(log: Trajectory) -> list[KembaError]:
     """Faults of one log; a later check runs only where the earlier ones found nothing."""
+    stages = (_columns, _time, _cells, _values)
     if log.meta["kind"] in OWN_RIGS:
-        return _own_faults(log)
-    for stage in (_columns, _time, _cells, _values):
+        stages = (_rig_columns, _rig_time, _rig_readings, _rig_excitation)
+    for stage in stages:
         found = list(stage(log))
         if found:
             return found
@@ -194,7 +196,8 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     good = np.flatnonzero(np.isfinite(y))
     values = y[good]
     equal = np.diff(values) == 0
-    start, length = _longest(equal)
+    start, end = max(runs(equal), key=lambda run: run[1] - run[0], default=(0, 0))
+    length = end - start
     elsewhere = np.delete(equal, np.s_[start : start + length])
     if length < limits.frozen or not len(elsewhere) or elsewhere.mean() > limits.repeats:
         return
@@ -220,17 +223,6 @@ def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
         what = f"leaps by {1e3 * step[i]:.1f} mm within {1e3 * passed[i]:.1f} ms"
         hint = "are two logs joined?"
         yield _log_fault(log, what, "a piston that moves", hint, row=int(good[i + 1]), column=name)
-
-
-def _longest(flags: np.ndarray) -> tuple[int, int]:
-    """Start and length of the longest run of True."""
-    if not flags.any():
-        return 0, 0
-    padded = np.concatenate([[False], flags, [False]]).astype(int)
-    edges = np.flatnonzero(np.diff(padded))
-    starts, ends = edges[::2], edges[1::2]
-    i = int(np.argmax(ends - starts))
-    return int(starts[i]), int(ends[i] - starts[i])
 
 
 def _excitation(log: Trajectory) -> Iterator[KembaError]:
@@ -276,15 +268,6 @@ def sentence(faults: Iterable[KembaError]) -> str:
     faults = list(faults)
     more = f" (and {len(faults) - 3} more)" if len(faults) > 3 else ""
     return "The data cannot be right: " + " | ".join(str(f) for f in faults[:3]) + more
-
-
-def _own_faults(log: Trajectory) -> list[KembaError]:
-    """Faults of the log of a rig; a later check runs only where the earlier ones found nothing."""
-    for stage in (_rig_columns, _rig_time, _rig_readings, _rig_excitation):
-        found = list(stage(log))
-        if found:
-            return found
-    return []
 
 
 def _rig_columns(log: Trajectory) -> Iterator[KembaError]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
+from kemba.events import runs
 from kemba.identify.problem.types import Array, MissingForce
 
 MEMORY = 0.025  # correlation time of the missing force [s]
@@ -99,11 +100,8 @@ def peaks(found: list[MissingForce]) -> list[Peak]:
 
 def spans(time: Array, flags: Array) -> tuple[tuple[float, float], ...]:
     """Intervals [s] in which `flags` (n,) holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     last = len(time) - 1
-    return tuple(
-        (float(time[a]), float(time[min(b, last)])) for a, b in edges.reshape(-1, 2).tolist()
-    )
+    return tuple((float(time[a]), float(time[min(b, last)])) for a, b in runs(flags.astype(bool)))
 
 
 RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # reach of a force at an end of the stroke [m]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
+from kemba.events import runs
 from kemba.model import Model
 from kemba.ocp.phases.settings import Reading
 from kemba.ocp.transcription.solution import arrays
@@ -115,8 +116,8 @@ def drop_grazes(modes: np.ndarray, time: np.ndarray, brief: float) -> None:
 
 def _fill_hops(modes: np.ndarray, gap: np.ndarray, hop: float) -> None:
     """Close a gap that opens by less than `hop` [m] for a step or two between two touches."""
-    runs = _runs(modes)
-    for (_, a), (b, _) in itertools.pairwise(runs):
+    touches = _runs(modes)
+    for (_, a), (b, _) in itertools.pairwise(touches):
         if b - a <= Reading.brief and gap[a:b].max() < hop:
             modes[a:b] = HELD
 
@@ -134,9 +135,7 @@ def _valves_first(modes: np.ndarray, valves: np.ndarray) -> None:
 
 def _runs(modes: np.ndarray) -> list[tuple[int, int]]:
     """Half-open ranges of rows in which a constraint is closed, the first row aside."""
-    closed = np.r_[0, (modes[1:] != OPEN).astype(int), 0]
-    edges = np.flatnonzero(np.diff(closed))
-    return [(int(a) + 1, int(b) + 1) for a, b in edges.reshape(-1, 2)]
+    return [(a + 1, b + 1) for a, b in runs(modes[1:] != OPEN)]
 
 
 def _listed(value: object) -> list[ca.DM]:
