@@ -9,15 +9,15 @@ no solve above 3 times the median. `--refine none` measures plans of implicit Eu
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the CLI does
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from kemba.ocp import load_task
-from kemba.plotting.studies import plot_growth
-from kemba.plotting.style import save_figure
+from kemba.plotting.style import BLUE, VERMILLION, key_above, paper_figure, paper_style, save_figure
 from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 
@@ -30,6 +30,27 @@ CHANGES: Sequence[list[str]] = (
     ["payload=0.2 kg"],
     ["supply=0.68 MPa", "payload=0.1 kg"],
 )
+
+
+@paper_style
+def plot_growth(
+    sizes: np.ndarray, seconds: Mapping[str, np.ndarray], exponents: Mapping[str, float]
+) -> Figure:
+    """Solve times [s] over numbers of nodes by task, with fitted powers of N."""
+    figure = paper_figure(3.0, 4.2)
+    axes = figure.add_subplot()
+    for index, (name, times) in enumerate(seconds.items()):
+        hue = (BLUE, VERMILLION)[index % 2]
+        exponent = exponents[name]
+        axes.loglog(sizes, times, "o", ms=4, color=hue, label=f"{name}: N^{exponent:.2f}")
+        level = np.exp(np.mean(np.log(times) - exponent * np.log(sizes)))
+        axes.loglog(sizes, level * np.asarray(sizes, dtype=float) ** exponent, color=hue)
+    axes.set_xticks(sizes, [str(size) for size in sizes], minor=False)
+    axes.minorticks_off()
+    axes.set_xlabel("nodes N")
+    axes.set_ylabel("solve time [s]")
+    key_above(axes)
+    return figure
 
 
 def seconds(name: str, nodes: int, asked: argparse.Namespace) -> list[float]:

@@ -232,24 +232,3 @@ def plot_robustness(
 def _size(found: Mapping[str, float | None]) -> float:
     """By what conditions are sorted: landing first."""
     return 2 * abs(found.get("landing") or 0.0) + abs(found.get("apex") or 0.0)
-
-
-@paper_style
-def plot_growth(
-    sizes: Array, seconds: Mapping[str, Array], exponents: Mapping[str, float]
-) -> Figure:
-    """Solve times [s] over numbers of nodes by task, with fitted powers of N."""
-    figure = paper_figure(3.0, 4.2)
-    axes = figure.add_subplot()
-    for index, (name, times) in enumerate(seconds.items()):
-        hue = (BLUE, VERMILLION)[index % 2]
-        exponent = exponents[name]
-        axes.loglog(sizes, times, "o", ms=4, color=hue, label=f"{name}: N^{exponent:.2f}")
-        level = np.exp(np.mean(np.log(times) - exponent * np.log(sizes)))
-        axes.loglog(sizes, level * np.asarray(sizes, dtype=float) ** exponent, color=hue)
-    axes.set_xticks(sizes, [str(size) for size in sizes], minor=False)
-    axes.minorticks_off()
-    axes.set_xlabel("nodes N")
-    axes.set_ylabel("solve time [s]")
-    key_above(axes)
-    return figure
