@@ -87,7 +87,7 @@ def _on_robot(answer: Path, path: Path, certify: bool, progress: Progress) -> di
     facts = {**found.json(), "next": f"kemba-opt {after_experiment(path, True)}"}
     if not certify:
         return facts
-    for tried in found.design.best[:PLANS]:
+    for tried in found.motions[:PLANS]:
         plan = _planned(found, tried, path, progress)
         if plan["good"]:
             run = plan["run"]

@@ -8,7 +8,7 @@ times, and planning finds the torques.
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -163,22 +163,14 @@ class Tried:
         return self.evidence.least / self.log_s
 
 
-@dataclass(frozen=True)
-class RobotDesign:
-    """The standard sway, and the best ones first; `tried` of them were simulated."""
-
-    standard: Tried
-    best: tuple[Tried, ...]
-    tried: int
-
-
 def _design_motion(
     model: Model,
     rivals: Rivals,
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
-) -> RobotDesign | None:
-    """The sways that tell the rivals apart best. `bounded`: in about a minute.
+) -> tuple[Tried, list[Tried], int] | None:
+    """The standard sway, those that tell the rivals apart best, and how many were simulated;
+    `bounded`: in about a minute.
 
     None where logs of a robot cannot show two of the rivals. Raises KembaError where the robot has
     one leg, or none of the sways is safe.
@@ -205,7 +197,7 @@ def _design_motion(
         say(f"{count} motions tried; the best is worth {found[0].evidence.worth:.2f}")
     if standard is None:
         raise KembaError(model.name, "no sway that was tried is safe", "feet that stand, knees up")
-    return RobotDesign(standard, tuple(found), count)
+    return standard, found, count
 
 
 def _try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
@@ -226,12 +218,6 @@ def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
     log.meta["name"] = "designed"
     found = separation(robot_problem([log], model), rivals)
     return found if found is not None else Separation("", {})
-
-
-def _expected_of_run(run: str | Path, model: Model, rivals: Rivals) -> Separation:
-    """The same of a run folder's plan."""
-    done = execute(run, model, sample=1.0 / SwaySettings.rows).trajectory
-    return expected(model, done, rivals)
 
 
 def safe(model: Model, done: Trajectory) -> bool:
@@ -297,17 +283,19 @@ def _point(sway: Sway) -> Array:
 
 @dataclass(frozen=True)
 class MotionProposal:
-    """Safe motions, the best one first, and the evidence that is expected of each."""
+    """The standard sway, and safe `motions`, the best one first; `tried` of them were simulated."""
 
     model: Model
     base: str
     rivals: Rivals
-    design: RobotDesign
+    standard: Tried
+    motions: Sequence[Tried]
+    tried: int
 
     @property
     def best(self) -> Tried:
         """The motion with the most expected evidence."""
-        return self.design.best[0]
+        return self.motions[0]
 
     @property
     def nats(self) -> float:
@@ -329,12 +317,12 @@ class MotionProposal:
     def sentence(self) -> str:
         """What the motion gains, in words."""
         first, second = self.pair
-        best, standard = self.best, self.design.standard
+        best, standard = self.best, self.standard
         what = f"A sway of {best.sway.duration:.2g} s with {best.sway.leans} leans"
         gives = f"{strength(self.nats)} evidence between {first} and {second}"
         if self.repeats is None:
             return (
-                f"{what} is the best of {self.design.tried} safe motions, and is expected to give "
+                f"{what} is the best of {self.tried} safe motions, and is expected to give "
                 f"{gives}: feet that stand and pistons at rest do not tell these two apart. Try "
                 "the rig (--on rig), or a jump."
             )
@@ -347,7 +335,6 @@ class MotionProposal:
 
     def json(self) -> dict[str, Any]:
         """The figures behind the sentence; `designed` and `standard` have the same keys."""
-        standard = self.design.standard
         return {
             "motion": "sway",
             "nats": self.nats,
@@ -357,8 +344,8 @@ class MotionProposal:
             "log_s": self.best.log_s,
             "repeats": self.repeats,
             "designed": self.best.evidence.json(self.best.log_s),
-            "standard": standard.evidence.json(standard.log_s),
-            "tried": self.design.tried,
+            "standard": self.standard.evidence.json(self.standard.log_s),
+            "tried": self.tried,
         }
 
     def write(self, out: Path, tried: Tried) -> None:
@@ -368,7 +355,8 @@ class MotionProposal:
 
     def nats_of(self, run: str | Path) -> float:
         """Expected evidence [nats] of the plan in a run folder."""
-        return _expected_of_run(run, self.model, self.rivals).least
+        done = execute(run, self.model, sample=1.0 / SwaySettings.rows).trajectory
+        return expected(self.model, done, self.rivals).least
 
 
 def propose_motion(
@@ -391,6 +379,6 @@ def propose_motion(
     if design is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no log of the robot shows a difference between {names}")
-    found = MotionProposal(model, base, rivals, design)
+    found = MotionProposal(model, base, rivals, *design)
     found.write(out, found.best)
     return found
