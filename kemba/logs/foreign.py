@@ -92,7 +92,9 @@ class _Reader:
         else:
             values = np.zeros(len(self.raw.columns[name]))
             for part, at in zip((source, source.add), source.names, strict=False):
-                counted = self._counted(self._column(TIME, at), from_first)
+                counted = self._column(TIME, at)
+                counted = counted - (counted[0] if from_first and len(counted) else 0)
+                counted = counted.astype(float)
                 values = values + self._converted(TIME, part or source, counted)
         return np.asarray(source.sign * source.scale * values + source.offset_in("s"))
 
@@ -193,10 +195,6 @@ class _Reader:
             where = f"{self.path}:{line}:{column}"
             raise KembaError(where, f"{name}: '{cells[row]}' is not a number", hint=hint)
         return numbers
-
-    def _counted(self, values: Column, from_first: bool) -> Array:
-        first = values[0] if from_first and len(values) else 0
-        return np.asarray(values - first, dtype=float)
 
 
 def pitch(x: Array, y: Array, z: Array, w: Array) -> Array:

@@ -151,7 +151,7 @@ def plant_run(done: Replay) -> Trajectory:
     """
     t = done.trajectory
     kept = t.select(name for name in t.names if not POINTS.fullmatch(name))
-    columns = {h: _digits(kept[n]) for h, n in zip(kept.headers, kept.names, strict=True)}
+    columns = {header: _digits(values) for header, values in kept.columns.items()}
     impacts = [
         {"time_s": round(i.time, 6), "what": list(i.labels), "energy_J": round(i.lost, 6)}
         for i in done.impacts
@@ -171,13 +171,10 @@ def _digits(values: Array) -> Array:
 
 def rest_after(model: Model, plan: Trajectory, controller: Trajectory) -> float:
     """For how long [s] the last commands are held: a plan that ends standing may come to rest."""
-    rests = ends_standing(plan, model.mechanism.legs) and _closed(controller)
+    # an open valve would keep it moving
+    still_open = any(controller[n][-1] for n in controller.names if "/valve/" in n)
+    rests = ends_standing(plan, model.mechanism.legs) and not still_open
     return SETTLE if rests else 0.0
-
-
-def _closed(controller: Trajectory) -> bool:
-    """Whether the last command leaves every valve closed: an open one would keep it moving."""
-    return not any(controller[name][-1] for name in controller.names if "/valve/" in name)
 
 
 def _tried(attempt: Callable[[], Replay]) -> Replay | None:

@@ -57,7 +57,8 @@ def counterpart(
         named = {e.name: e for e in (*own.effects, *changed_effects(model, changes or {}))}
         theirs = _described(spec)
         air = {e.name for make in CHAMBERS.values() for e in make()}
-        fixed = {e.name for e in theirs if e.name not in _learnt(own)} | air
+        learnt = {e.name for e in own.effects if e.support is not None}
+        fixed = {e.name for e in theirs if e.name not in learnt} | air
         mine = [e for e in named.values() if e.moves and e.name not in fixed]
         kept = {e.name: e for e in (*theirs, *mine)}
         spec = spec.model_copy(update={"effects": tuple(kept.values())})
@@ -82,11 +83,6 @@ def _described(plant: ModelSpec) -> list[Effect]:
     """What a plant has beyond the shipped planning model."""
     plain: list[Effect] = [*load_spec(PLAIN).effects]
     return [e for e in plant.effects if e not in plain]
-
-
-def _learnt(model: ModelSpec) -> set[str]:
-    """The effects of a model that were learnt from logs."""
-    return {e.name for e in model.effects if e.support is not None}
 
 
 COMMANDS = re.compile(r".*(hip/tau|valve/(extend|retract))")
@@ -130,7 +126,7 @@ def take_log(
     then noise, then quantisation. Commands are logged as they are."""
     effects = list(effects)
     columns, sigmas = {}, {}
-    for header, name in zip(truth.headers, truth.names, strict=True):
+    for name, header in zip(truth.names, truth.headers, strict=True):
         if not CHANNEL.fullmatch(name):
             continue
         values = _averaged(truth, name)
@@ -233,13 +229,8 @@ def repeat_run(
 
 def _as_sent(log: Trajectory, table: Trajectory) -> Trajectory:
     """The log with valve commands as sent: a log cannot show how late each valve acts."""
-    row = np.maximum(np.searchsorted(table.time, log.time + 1e-9, side="right") - 1, 0)
-    valves = {
-        header: table[name][row]
-        for header, name in zip(log.headers, log.names, strict=True)
-        if "/valve/" in name and name in table
-    }
-    return log.with_columns(valves)
+    valves = [name for name in log.names if "/valve/" in name and name in table]
+    return log.with_columns({f"{n} [{log.unit(n)}]": table.held(n, log.time) for n in valves})
 
 
 def plant_of(run: str | Path, name: str | None = None) -> Model:

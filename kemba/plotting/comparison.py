@@ -94,7 +94,8 @@ def plot_ladder(
     axes.set_xscale("log")
     numbers = [*fitted, *(held_out if held_out is not None else ()), 1.0]
     axes.set_xlim(min(numbers) / 1.3, max(numbers) * 1.3)
-    ticks = [t for t in (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if _within(t, axes)]
+    low, high = axes.get_xlim()
+    ticks = [t for t in (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if low <= t <= high]
     axes.set_xticks(ticks, [f"{t:g}" for t in ticks])
     axes.minorticks_off()
     axes.set_yticks(rungs, [s if i == 0 else f"+ {s}" for i, s in enumerate(steps)])
@@ -102,11 +103,6 @@ def plot_ladder(
     axes.set_xlabel("error / noise")
     key_above(axes)
     return figure
-
-
-def _within(number: float, axes: Axes) -> bool:
-    low, high = axes.get_xlim()
-    return low <= number <= high
 
 
 FLOOR, CEILING = 1.0, 30.0  # error ratios between which the heat map changes its colour

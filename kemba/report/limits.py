@@ -167,10 +167,11 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
     for track, e in zip(tracks, events, strict=True):
         if e is None:
             continue
+        tops = e.apexes if len(e.apexes) > 1 else [(e.apex_time, e.apex)]
         rows.append(
             [
                 escape(track.name),
-                _tops(e),
+                ", ".join(f"{z:.3f} m at {time:.3f} s" for time, z in tops),
                 _or_dash(e.feet, 100, "cm"),
                 _times(e.lift_offs),
                 *(_touchdown(e, leg) for leg in legs),
@@ -180,12 +181,6 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
     clock = "Times of the plan's clock. " if any(track.role == "plan" for track in tracks) else ""
     title = f"{clock}The apex is that of the body's centre, which is above the feet."
     return table(title, heads, rows)
-
-
-def _tops(e: Events) -> str:
-    """The apexes of several flights, else the highest point."""
-    tops = e.apexes if len(e.apexes) > 1 else [(e.apex_time, e.apex)]
-    return ", ".join(f"{z:.3f} m at {time:.3f} s" for time, z in tops)
 
 
 def _touchdown(e: Events, leg: str) -> str:
@@ -276,7 +271,13 @@ def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -
     cylinder = machine.mechanism.need_cylinder()
     found = [energy_of(t, machine.mechanism.legs, cylinder, certificate) for t in book.tracks]
     rows = [
-        [escape(track.name), *_both(one.pistons), *_both(one.hips), _impacts(one), _air(one)]
+        [
+            escape(track.name),
+            *_both(one.pistons),
+            *_both(one.hips),
+            _or_dash(one.impacts, 1, "J"),
+            _air(one),
+        ]
         for track, one in zip(book.tracks, found, strict=True)
     ]
     heads = ["motion", "pistons put in", "pistons take out", "hips put in", "hips take out"]
@@ -322,10 +323,6 @@ def _or_dash(value: float | None, factor: float, unit: str) -> str:
 def _both(work: Array | None) -> tuple[str, str]:
     pair = put_in(work)
     return (f"{pair[0]:.1f} J", f"{pair[1]:.1f} J") if pair else ("-", "-")
-
-
-def _impacts(one: Energy) -> str:
-    return "-" if one.impacts is None else f"{one.impacts:.1f} J"
 
 
 def _air(one: Energy) -> str:

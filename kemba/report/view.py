@@ -134,7 +134,7 @@ def _times(source: Source, ghost: Source | None) -> Array:
 
 def _robot(shown: list[Pose], legs: tuple[str, ...]) -> dict[str, Any]:
     return {
-        "points": {name: _rounded(shown, name) for name in shown[0].points},
+        "points": {n: [pose.points[n].round(4) for pose in shown] for n in shown[0].points},
         "valves": {leg: ["".join(map(str, pose.valves[leg])) for pose in shown] for leg in legs},
         "stands": {leg: [int(pose.stands[leg]) for pose in shown] for leg in legs},
         "centres": [pose.centre.round(4) for pose in shown],
@@ -161,10 +161,6 @@ def fill(name: str, **values: str) -> str:
 def page_text(name: str) -> str:
     """The text of a file in `pages`."""
     return (PAGES / name).read_text(encoding="utf-8")
-
-
-def _rounded(shown: list[Pose], name: str) -> list[Any]:
-    return [pose.points[name].round(4) for pose in shown]
 
 
 ENDING = ".rrd"

@@ -41,7 +41,12 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
     plant, planned = (
         model_name(expansion, m) for m in (block.plant, _model(expansion, name, block))
     )
-    base = Document({**_planned(expansion, name, block), **_given(block.conditions)})
+    base = Document(
+        {
+            **_planned(expansion, name, block),
+            **block.conditions.model_dump(exclude_none=True, exclude_unset=True),
+        }
+    )
     works = []
     for values in sample(block, name, expansion.sweep.seed):
         conditions = parse(expansion.varied(base, name, values), Conditions)
@@ -68,10 +73,6 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
              shared | {"conditions": conditions.model_dump(exclude_none=True)}, name)
         for index, (values, conditions) in enumerate(works)
     ]  # fmt: skip
-
-
-def _given(conditions: Conditions) -> dict[str, Any]:
-    return conditions.model_dump(exclude_none=True, exclude_unset=True)
 
 
 def _planned(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def effect_candidates(model: Model) -> dict[str, Candidate]:
             continue
         whole = not any(field.is_required() for field in effect.model_fields.values())
         if missing and whole and _fits(model, effect):
-            found[kind] = candidate(effect)
+            found[kind] = _candidate(kind, effect, effect.declared())
     return found
 
 
@@ -153,15 +153,6 @@ def geometry_candidates(model: Model) -> dict[str, Candidate]:
     }
 
 
-def candidate(effect: type[Effect], declared: Mapping[str, Param] | None = None) -> Candidate:
-    """What `effect` declares: the parameter in `off` switches it, the others are shapes.
-
-    `declared`: parameters by name where their sizes differ from those of the class.
-    """
-    kind = effect.model_fields["kind"].default
-    return _candidate(kind, effect, effect.declared() if declared is None else declared)
-
-
 def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
     """Every sensor fault that the model's list lacks; `sigmas`: noise per sample by channel."""
     present = {e.name for e in model.effects}
@@ -176,6 +167,7 @@ def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Ca
 def _candidate(
     name: str, effect: type[Effect], declared: Mapping[str, Param], sensor: bool = False
 ) -> Candidate:
+    """What an effect declares: the parameter in `off` switches it, the others are shapes."""
     settings = CandidateSettings
     (lead, off), *_ = effect.off.items()
     param = declared[lead]

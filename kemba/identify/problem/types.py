@@ -70,10 +70,10 @@ class Candidate:
         """Every parameter by its name in theta."""
         return {f"{self.effect}.{p.name}": p for p in self.parameters}
 
-    def typical(self, sign: float = 1.0) -> dict[str, float]:
+    def typical(self) -> dict[str, float]:
         """Theta of this effect at its size."""
         values = {f"{self.effect}.{p.name}": p.typical for p in self.shapes}
-        return {self.key: self.lead.off + sign * self.lead.size, **values}
+        return {self.key: self.lead.off + self.lead.size, **values}
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,11 @@ def joint_state_labels(raw: Raw) -> dict[str, str]:
     """Names for the columns of `ros2 topic echo --csv` of a JointState: stamp, frame, the joints'
     names, then their positions, velocities and efforts. Empty where the columns are others."""
     texts = {name: cells for name, cells in raw.items() if cells.dtype == object and len(cells)}
-    constant = [n for n, cells in texts.items() if len(set(cells)) == 1 and _is_text(cells[0])]
+    constant = [
+        n
+        for n, cells in texts.items()
+        if len(set(cells)) == 1 and any(map(str.isalpha, str(cells[0])))
+    ]
     joints = [str(raw[name][0]) for name in constant if name.isdigit() and int(name) > 3]
     after = [name for name in raw if name.isdigit() and int(name) > 3 + len(joints)]
     if not joints or len(after) < len(joints):
@@ -242,10 +246,6 @@ def _is_time(unit: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _is_text(cell: Any) -> bool:
-    return any(letter.isalpha() for letter in str(cell))
 
 
 def _rises(values: Array, named: bool = True) -> bool:

@@ -198,6 +198,9 @@ def draft_map(
         t.header for t in targets if t.needed and t.header not in {*found.pairs, *found.ties}
     )
     ties = [f"{header} may be {_either(names_)}" for header, names_ in found.ties.items()]
+    joined = [
+        f"{h} begins anew after each turn: joined" for h, s in columns.items() if "unwrap" in s
+    ]
     return Draft(
         kind,
         layout | ({"origin": "first"} if stamp.from_first else {}),
@@ -205,12 +208,8 @@ def draft_map(
         missing,
         tuple(name for name in raw.columns if name not in read),
         tuple(filter(None, [stamp.question, *ties, *asked])),
-        (f"Time: {stamp.reason}.", *said, *raw.remarks, *_joined(columns)),
+        (f"Time: {stamp.reason}.", *said, *raw.remarks, *joined),
     )
-
-
-def _joined(columns: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    return [f"{h} begins anew after each turn: joined" for h, s in columns.items() if "unwrap" in s]
 
 
 def _stated(raw: Recording) -> dict[str, str]:

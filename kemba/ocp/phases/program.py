@@ -86,7 +86,11 @@ class PhaseProgram:
         self.phases, self.constraints = list(phases), list(constraints)
         self.nodes = phases[-1].last
         self.layout = Layout(model, reduction, task.duration / self.nodes, task.step_variation)
-        self.impacts = [p for p in range(1, len(phases)) if self._closes(p)]
+        self.impacts = [
+            p
+            for p in range(1, len(phases))
+            if any(self.closes(p, i) for i in range(len(self.constraints)))
+        ]
         self.columns = Columns(self.layout, phases, self.impacts, scheme.stages)
         self.lower, self.upper = self._bounds()
         self.element = element(model, self.layout, reduction, task.cost, scheme)
@@ -94,10 +98,6 @@ class PhaseProgram:
         self.added: list[PhasePart] = []
         self.requirements: Sequence[Requirement] = ()
         self.apex = 0  # the node after which impacts are those of the landing
-
-    def _closes(self, p: int) -> bool:
-        """Whether a constraint that was open is closed from phase p on."""
-        return any(self.closes(p, i) for i in range(len(self.constraints)))
 
     def closes(self, p: int, i: int) -> bool:
         """Whether constraint i was open before phase p and is closed in it."""
