@@ -19,22 +19,6 @@ from kemba.model.spec import ModelSpec
 from kemba.quantity import is_si
 
 
-def _always(effect: type[Effect]) -> bool:
-    return True
-
-
-def _switched(effect: type[Effect]) -> bool:
-    return bool(effect.off)
-
-
-def _on_one_leg(effect: type[Effect]) -> bool:
-    return bool(effect.off) and _on_legs(effect)
-
-
-def _dissipative(effect: type[Effect]) -> bool:
-    return effect.dissipative
-
-
 def _on_legs(effect: type[Effect]) -> bool:
     return effect.place == "leg" and effect not in (*DRIVE, *OWN_RIGS)
 
@@ -44,7 +28,7 @@ class Check:
     """A promise: `run` raises Broken when an effect does not keep it."""
 
     run: Callable[[Placed], None]
-    applies: Callable[[type[Effect]], bool] = _always
+    applies: Callable[[type[Effect]], bool] = lambda effect: True
 
     @property
     def name(self) -> str:
@@ -165,12 +149,12 @@ CHECKS = (
     Check(schema_names_units),
     Check(physics.finite),
     Check(physics.every_parameter_matters),
-    Check(physics.off_is_absent, _switched),
-    Check(physics.dissipates, _dissipative),
+    Check(physics.off_is_absent, lambda effect: bool(effect.off)),
+    Check(physics.dissipates, lambda effect: effect.dissipative),
     Check(physics.order_does_not_matter),
     Check(physics.supply_can_be_left_open),
     Check(physics.keeps_the_mirror, _on_legs),
-    Check(physics.one_leg_only, _on_one_leg),
+    Check(physics.one_leg_only, lambda effect: bool(effect.off) and _on_legs(effect)),
     Check(physics.sensor_fault_can_be_undone, physics.measures),
     Check(physics.nominal_figures_matter, physics.moves),
 )

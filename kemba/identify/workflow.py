@@ -36,17 +36,14 @@ PLANT = "plant"  # the shipped simulated robot, with physical chambers
 AROUND = 0.01  # s before and after a reading from which a speed is told
 
 
-def _with_learnt_noise(problem: Problem) -> Problem:
-    """The problem under the noise of its own logs, learnt beside a flexible model."""
-    return with_learnt_colour(problem, free_starts(problem))
-
-
 def noise_ratio(problem: Problem, figures: Mapping[str, float] | None = None) -> float:
     """Error of the model as it is, in units of the noise: `noise_ratio` of `compare`.
 
     `figures`: of the machine, as `Evidence.figures`; without them all are nominal.
     """
-    return error_ratio(_with_learnt_noise(problem), _figures_felt(problem, figures or {}))
+    return error_ratio(
+        with_learnt_colour(problem, free_starts(problem)), _figures_felt(problem, figures or {})
+    )
 
 
 def _figures_felt(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
@@ -329,7 +326,7 @@ def compare_read(
     tell("finding the motion in the logs")
     problem, _ = admitted(read, built)
     tell("learning the noise of the sensors")
-    problem = _with_learnt_noise(problem)
+    problem = with_learnt_colour(problem, free_starts(problem))
     tell("comparing with the model")
     evidence = load_spec(model).evidence
     figures = _figures_felt(problem, evidence.figures) if evidence else {}

@@ -51,13 +51,17 @@ class Band:
 def plot_bands(bands: Sequence[Band], explained: str = "explained") -> Figure:
     """Estimates such as the missing force d(t), one panel each, with bands and a line at zero."""
     figure = paper_figure(0.95 * len(bands) + 0.55)
-    grid = figure.subplots(len(bands), 1, squeeze=False, sharex=True)[:, 0]
+    _bands(figure, bands, explained)
+    return figure
+
+
+def _bands(room: FigureBase, bands: Sequence[Band], explained: str = "explained") -> None:
+    grid = room.subplots(len(bands), 1, squeeze=False, sharex=True)[:, 0]
     for axes, band in zip(grid, bands, strict=True):
         draw_band(axes, band, explained)
     key_above(grid[0])
     grid[-1].set_xlabel("time [s]")
-    figure.align_ylabels()
-    return figure
+    room.align_ylabels()
 
 
 def draw_band(axes: Axes, band: Band, explained: str = "explained") -> None:
@@ -224,7 +228,9 @@ def plot_comparison(found: Comparison) -> Figure:
     rooms = figure.subfigures(3, 1, height_ratios=[max(p, 0.01) for p in parts], squeeze=False)
     heat, time, force = rooms[:, 0]
     _heat(heat, found.bins, channels, tables)
-    _bands(time, bands)
+    if bands:
+        _bands(time, bands)
+        time.axes[0].set_title("missing force", loc="left")
     _profiles(force, panels)
     return figure
 
@@ -307,18 +313,6 @@ def _owner(channel: str) -> str:
     if channel == "piston/F":
         return "rod"
     return channel.replace("piston/x", "rod").replace("hip/q", "hip").replace("/", " ")
-
-
-def _bands(room: SubFigure, bands: Sequence[Band]) -> None:
-    if not bands:
-        return
-    grid = room.subplots(len(bands), 1, squeeze=False, sharex=True)[:, 0]
-    for axes, band in zip(grid, bands, strict=True):
-        draw_band(axes, band)
-    key_above(grid[0])
-    grid[0].set_title("missing force", loc="left")
-    grid[-1].set_xlabel("time [s]")
-    room.align_ylabels()
 
 
 def panels_of(found: Sequence[ForceProfile]) -> list[ForceProfile]:

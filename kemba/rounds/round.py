@@ -45,10 +45,7 @@ SUPPLY = 0.7e6  # Pa, of a model that names none
 ENTRY = "learn"  # of the manifest of a run that `learn` made
 
 
-class MatchSettings:
-    """When a log is an execution of a run."""
-
-    valves = 0.02  # share of rows in which a valve command differs from the table
+OTHER = 0.02  # share of rows in which a valve command differs from the table: another run's log
 
 
 @dataclass(frozen=True)
@@ -144,7 +141,7 @@ def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
             time = log.time - log.time[0] + begin
             tried.append((_differs(table, log, time), place, time))
     miss, place, time = min(tried, key=lambda trial: trial[0])
-    if miss > MatchSettings.valves:
+    if miss > OTHER:
         what = f"its valve commands differ from the run's in {miss:.0%} of the rows"
         hint = "give the run that was executed, or logs that begin where its controller.csv begins"
         raise KembaError(str(log.meta["path"]), what, f"an execution of {runs[place].path}", hint)

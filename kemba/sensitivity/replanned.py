@@ -81,11 +81,11 @@ def _asked(task: Task, model: Model) -> Iterator[FigureStep]:
     for name in ("height", "feet", "distance"):
         value = getattr(task, name)
         if value is not None:
-            yield FigureStep(name, "m", float(value), LENGTH, False, _task_with(task, model, name))
 
+            def changed(value: float, name: str = name) -> Problem:
+                return task.model_copy(update={name: value}), model
 
-def _task_with(task: Task, model: Model, name: str) -> Callable[[float], Problem]:
-    return lambda value: (task.model_copy(update={name: value}), model)
+            yield FigureStep(name, "m", float(value), LENGTH, False, changed)
 
 
 def _air_and_load(task: Task, model: Model) -> Iterator[FigureStep]:

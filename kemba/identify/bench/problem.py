@@ -132,8 +132,7 @@ class BenchProblem(ColouredProblem):
 
     def rows(self) -> Rows:
         parts: list[tuple[np.ndarray, ...]] = []
-        for i in range(len(self.logs)):
-            log = self.logs[i]
+        for i, log in enumerate(self.logs):
             for c in log.measured:
                 keep = log.keep[c]
                 n, k = int(keep.sum()), self.channels.index(c)

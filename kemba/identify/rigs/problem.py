@@ -65,32 +65,22 @@ class RigProblem(ColouredProblem):
 
     def residual(self, theta: Theta) -> Array:
         parts = []
-        for i in range(len(self.logs)):
+        for i, log in enumerate(self.logs):
             with np.errstate(over="ignore"):  # a fit may try what nothing is predicted at
-                r = self.predictor.gap(self.logs[i], theta) / self._sigma[i]
+                r = self.predictor.gap(log, theta) / self._sigma[i]
             parts.append(whiten(r, self.colour[i, 0]) if (i, 0) in self.colour else r)
         return np.concatenate(parts)
 
     def rows(self) -> Rows:
         still, parts = self.model.mechanism.sign_speed, []
-        for i in range(len(self.logs)):
-            log = self.logs[i]
+        for i, log in enumerate(self.logs):
             n, v = len(log.time), log.speed
             phase = np.where(np.abs(v) < still, "rest", np.where(v > 0, "forward", "back"))
             parts.append((np.full(n, i), log.time, phase, self._sigma[i]))
         run, time, phase, sigma = (np.concatenate(p) for p in zip(*parts, strict=True))
-        n = len(run)
-        mode = np.full(n, "", dtype=object)
-        return Rows(
-            run,
-            np.zeros(n, dtype=int),
-            time,
-            phase,
-            mode,
-            (self.answer,),
-            sigma,
-            {self.answer: self.unit},
-        )
+        channel, mode = np.zeros(len(run), dtype=int), np.full(len(run), "", dtype=object)
+        units = {self.answer: self.unit}
+        return Rows(run, channel, time, phase, mode, (self.answer,), sigma, units)
 
     def coarser(self, theta: Theta) -> Self:
         """The same problem without colour, which forgets what changes slowly, and with what the

@@ -130,8 +130,8 @@ class VesselProblem(Problem):
 
     def residual(self, theta: Theta) -> Array:
         parts = []
-        for i in range(len(self.logs)):
-            log, expected = self.logs[i], self.expected(theta, i)
+        for i, log in enumerate(self.logs):
+            expected = self.expected(theta, i)
             parts += [
                 (expected[name] - y) / log.sigma[name] for name, (_, y) in log.readings.items()
             ]
@@ -155,8 +155,7 @@ class VesselProblem(Problem):
     def rows(self) -> Rows:
         names = tuple(n for n in CHANNELS if any(n in g.readings for g in self.logs))
         parts = []
-        for i in range(len(self.logs)):
-            log = self.logs[i]
+        for i, log in enumerate(self.logs):
             for name, (time, _) in log.readings.items():
                 n = len(time)
                 one = (np.full(n, i), np.full(n, names.index(name)), time)
