@@ -70,6 +70,12 @@ class Model:
         raise KembaError(self.name, f"no effect '{name}'", hint=suggest(name, names))
 
     @property
+    def state(self) -> list[Quantity]:
+        """What the state x = (q, v, s) consists of: coordinates, velocities, effect states."""
+        moving = self.mechanism.coordinates, self.mechanism.velocities
+        return [*moving[0], *moving[1], *self.states.values()]
+
+    @property
     def ignored(self) -> list[str]:
         """Effects that are part of measuring, not of the motion, such as a sensor's bias."""
         return [e.name for e in self.effects if not e.moves]

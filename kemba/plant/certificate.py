@@ -34,10 +34,9 @@ def moving_start(machine: Model, plan: Trajectory) -> dict[str, float]:
     (the pressure). States of which the plan knows nothing are where they come to rest while the
     first commands are held. Raises KembaError as `at_rest` does.
     """
-    mechanism, node = machine.mechanism, machine.node
-    listed = [*mechanism.coordinates, *mechanism.velocities, *machine.states.values()]
-    found = {q.name: float(plan[q.name][0]) for q in listed if q.name in plan}
-    q = np.array([found[c.name] for c in mechanism.coordinates])
+    node = machine.node
+    found = {q.name: float(plan[q.name][0]) for q in machine.state if q.name in plan}
+    q = np.array([found[c.name] for c in machine.mechanism.coordinates])
     first = min(1, len(plan) - 1)  # inputs act on the interval before a node
     u = [float(plan[i.name][first]) if i.name in plan else 0.0 for i in machine.inputs.values()]
     s = at_rest(machine, q, u)

@@ -74,9 +74,7 @@ class Player:
         rates = np.zeros((ROOM, len(m.gaps)))
         self._log = Impacts(count, times, lost, np.zeros((ROOM, m.nl)), rates)
         self._progress = NextMark(np.zeros(1, dtype=int), np.zeros(1, dtype=bool))
-        mechanism = model.mechanism
-        sensed = (*mechanism.coordinates, *mechanism.velocities, *model.states.values())
-        self._sensed = [quantity.name for quantity in sensed]
+        self._sensed = [quantity.name for quantity in model.state]
         self._inputs = {name: i for i, name in enumerate(input_names(model))}
 
     def play(self, step: float | None) -> None:

@@ -94,9 +94,8 @@ def replay(model: Model, plan: Trajectory, step: float | None = None) -> Replay:
 
 def first_row(model: Model, plan: Trajectory) -> dict[str, float]:
     """Coordinates, velocities and effect states at the start of a plan, as far as it has them."""
-    mechanism = model.mechanism
-    listed = [*mechanism.coordinates, *mechanism.velocities, *model.states.values()]
-    names = [q.name for q in listed] + [f"{leg}/piston/x" for leg in mechanism.legs]
+    names = [q.name for q in model.state]
+    names += [f"{leg}/piston/x" for leg in model.mechanism.legs]
     present = (name for name in names if name in plan and np.isfinite(plan[name][0]))
     return {name: float(plan[name][0]) for name in present}
 

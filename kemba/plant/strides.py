@@ -44,9 +44,7 @@ def multipliers(model: Model, plan: Trajectory) -> Array:
     to the state before it, without `body/x`. Above 1 in size, errors grow from stride to stride.
     Raises KembaError where a stride cannot be simulated.
     """
-    mechanism = model.mechanism
-    listed = [*mechanism.coordinates, *mechanism.velocities, *model.states.values()]
-    listed = [q for q in listed if q.name != "body/x"]
+    listed = [q for q in model.state if q.name != "body/x"]
     after = _stride_map(model, plan)
     columns = []
     for q in listed:

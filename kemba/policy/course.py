@@ -53,8 +53,7 @@ class Builder:
         self.hybrid, self.motion, self.begin = hybrid, motion, begin
         self.sent, self.acting, self.control = sent, acting, control
         model = hybrid.model
-        names = [q.name for q in (*model.mechanism.coordinates, *model.mechanism.velocities)]
-        self.names = [*names, *(q.name for q in model.states.values())]
+        self.names = [q.name for q in model.state]
         self.inputs = [q.name for q in model.inputs.values()]
         self.x = np.column_stack([motion[name] for name in self.names])
         self.torques = [self.inputs.index(f"{joint}/tau") for joint in control.joints]

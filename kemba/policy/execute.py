@@ -96,8 +96,8 @@ def execute_policy(
 def _sent(table: Trajectory, policy: Policy, commands: list[Array]) -> Trajectory:
     """The table with the valve commands that were sent."""
     rows = np.array(commands + [commands[-1]] * len(table))[: len(table)]
-    headers = {n: h for h, n in zip(table.headers, table.names, strict=True)}
-    return table.with_columns({headers[n]: rows[:, i] for i, n in enumerate(policy.valves)})
+    sent = zip(policy.valves, rows.T, strict=True)
+    return table.with_columns({f"{n} [{table.unit(n)}]": values for n, values in sent})
 
 
 def player_of(file: str | Path, run: str | Path) -> Play:

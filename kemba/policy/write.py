@@ -12,6 +12,7 @@ from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.plant.controller import PERIOD, Gains, hip_control, read_controller
 from kemba.plant.repeat import Sensors
+from kemba.plant.retiming import edges_of
 from kemba.policy.course import course_of
 from kemba.policy.modes import (
     ADDED,
@@ -258,7 +259,7 @@ def policy_arrays(
         clock = (first + np.arange(ticks)) * PERIOD
         noise = Sensors.usual().noise
         names = [*names, *also]
-        found = expected_from(executions, clock, names, _states(model), noise)
+        found = expected_from(executions, clock, names, [q.name for q in model.state], noise)
         reference, to_x = found.mean, found.estimate
     landing = _landing(course)
     gains = gains_of(course, landing)
@@ -299,10 +300,9 @@ def _edges(
     valves = [name for name in table.names if "/valve/" in name]
     listed = []
     for v, name in enumerate(valves):
-        switched = np.flatnonzero(np.diff(np.round(table[name]), prepend=0.0))
-        for k, tick in enumerate(switched):
+        for k, tick in enumerate(edges_of(table)[name]):
             gain = gains.get((name, k), np.zeros(course.hybrid.size))
-            listed.append((int(tick), v, float(k % 2 == 0), gain @ to_x[tick]))
+            listed.append((tick, v, float(k % 2 == 0), gain @ to_x[tick]))
     listed.sort(key=lambda edge: edge[:2])
     size = to_x.shape[2]
     return {
@@ -312,13 +312,6 @@ def _edges(
         "edge_value": np.array([e[2] for e in listed]),
         "edge_gain": np.array([e[3] for e in listed]).reshape(-1, size) / PERIOD,
     }
-
-
-def _states(model: Model) -> list[str]:
-    """The names of x: coordinates, velocities, effect states."""
-    mechanism = model.mechanism
-    moving = [q.name for q in (*mechanism.coordinates, *mechanism.velocities)]
-    return [*moving, *(q.name for q in model.states.values())]
 
 
 def _to_state(course: EventCourse) -> Array:

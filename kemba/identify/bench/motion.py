@@ -57,9 +57,9 @@ def smooth_motion(
     noise = noise or ChannelNoise()
     grid, values, step = _even_grid(time, x)
     sigma = max(difference_sigma(x[good]), FINEST)
-    position, rate, spread, half = _adaptive(values, sigma, step, noise)
+    position, rate, spread = _adaptive(values, sigma, step, noise)
     if v is not None and np.isfinite(v).sum() > MEASURED * len(v):
-        rate, spread = _weigh_in(grid, rate, spread, half, time, v)
+        rate, spread = _weigh_in(grid, rate, spread, time, v)
     a = np.gradient(_mean(rate, 3), step)
     x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
     return SmoothedMotion(time, x, v, a, spread, sigma * noise.spread)
@@ -77,8 +77,8 @@ def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
 
 def _adaptive(
     values: Array, sigma: float, step: float, colour: ChannelNoise
-) -> tuple[Array, Array, Array, Array]:
-    """Position, rate, its error and the half width chosen sample by sample.
+) -> tuple[Array, Array, Array]:
+    """Position, rate and its error, over the window that is chosen sample by sample.
 
     A cubic cannot follow every motion. A quintic in the same window follows more of them. The
     square of their difference, without the share that noise has in it, estimates the square of the
@@ -86,7 +86,7 @@ def _adaptive(
     """
     n = len(values)
     best = np.full(n, np.inf)
-    position, rate, half = values.copy(), np.zeros(n), np.zeros(n)
+    position, rate = values.copy(), np.zeros(n)
     for width in HALF_WIDTHS:
         if 2 * width + 1 > n:
             break
@@ -97,9 +97,9 @@ def _adaptive(
         bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
         risk = noise + np.maximum(bias, 0.0)
         better = risk < best
-        position[better], rate[better], half[better] = x[better], v[better], width
+        position[better], rate[better] = x[better], v[better]
         best[better] = risk[better]
-    return position, _mean(rate, 1), np.sqrt(best), half
+    return position, _mean(rate, 1), np.sqrt(best)
 
 
 def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) -> Array:
@@ -119,7 +119,7 @@ def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> A
 
 
 def _weigh_in(
-    grid: Array, rate: Array, spread: Array, half: Array, time: Array, v: Array
+    grid: Array, rate: Array, spread: Array, time: Array, v: Array
 ) -> tuple[Array, Array]:
     """The mean of measured and derived velocity, weighted by their errors.
 

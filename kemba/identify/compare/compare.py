@@ -112,7 +112,7 @@ def compare(
         tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
         clean and not any(profile.matters for profile in force_profiles(problem, tolerant.left)),
-        (*sent, *conflicts(problem, rows, r, known)),
+        (*sent, *conflicts(rows, r, known)),
         responses,
         forces,
         tuple(problem.missing_force(start)),

@@ -163,7 +163,7 @@ def _strongest(
     return best
 
 
-def conflicts(problem: Problem, rows: Rows, r: Array, known: Slopes) -> list[Hint]:
+def conflicts(rows: Rows, r: Array, known: Slopes) -> list[Hint]:
     """Parameters whose best values differ by more than their error allows, from run to run or from
     one valve mode to another; the clearest first. `r` (n,): the residual."""
     groups = {"all runs": rows.run, "all positions of the valves": codes(rows.mode)}

@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -26,7 +26,6 @@ from kemba.logs.draft.matching import (
 )
 from kemba.logs.draft.words import SPELT, Names, is_unit, quaternions, strange_unit, upright
 from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
-from kemba.logs.recording import Recording
 from kemba.logs.text import cells_of, encoding, joined
 from kemba.trajectory import TIME, Array
 
@@ -177,8 +176,9 @@ def draft_map(
     trial = ColumnMap.model_construct(**layout)
     raw = raw_columns(path, trial)
     labels = {} if trial.header else joint_state_labels(raw.columns)
-    below = {**_units_below(path, layout, list(raw.columns)), **_stated(raw)}
-    names = Names(legs, labels, below, switches(raw.columns), tuple(raw.columns))
+    below = zip(raw.columns, units_below(path, layout), strict=False)
+    stated = {**_spelt(below), **_spelt(raw.units.items())}
+    names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns))
     values = numbers(raw.columns, trial.decimal)
     stamp = stamp_of(raw.columns, values, names)
     if stamp is None:
@@ -212,18 +212,9 @@ def draft_map(
     )
 
 
-def _stated(raw: Recording) -> dict[str, str]:
-    """The units that the file states, as far as they are units."""
-    spelt = {name: SPELT.get(unit, unit) for name, unit in raw.units.items()}
-    return {name: unit for name, unit in spelt.items() if is_unit(unit)}
-
-
-def _units_below(path: Path, layout: Layout, names: Sequence[str]) -> dict[str, str]:
-    """The units in the row below the header; texts that are no units are left out."""
-    spelt = {
-        name: SPELT.get(text, text)
-        for name, text in zip(names, units_below(path, layout), strict=False)
-    }
+def _spelt(units: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """The units of columns as pint spells them; texts that are no units are left out."""
+    spelt = {name: SPELT.get(text, text) for name, text in units}
     return {name: unit for name, unit in spelt.items() if is_unit(unit)}
 
 
@@ -272,12 +263,12 @@ def _sources(
             columns[target.header] = {"source": list(turned[name])}
         else:
             columns[target.header] = _source(target, name, unit, values[name])
-        asked += _asked(target, name, unit, names, values[name])
+        asked += _asked(target, name, names, values[name])
     _share_level(columns, found.pairs, values)
     return columns, asked
 
 
-def _asked(target: Target, name: str, unit: str | None, names: Names, y: Array) -> list[str]:
+def _asked(target: Target, name: str, names: Names, y: Array) -> list[str]:
     """What a person has to say about a column that was found."""
     found = []
     written = names.labels.get(name, name)

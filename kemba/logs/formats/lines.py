@@ -34,11 +34,10 @@ def read_lvm(path: Path) -> Recording:
     width = len([name for name in header if name != "Comment"])
     table = _table(path, lines[first + 1 : stop], separator, decimal, width, first + 2)
     said = ["only the first of its segments is read"] if len(ends) > 2 else []
-    return _lvm_columns(keys, own, header[:width], table, said)
+    return _lvm_columns(own, header[:width], table, said)
 
 
 def _lvm_columns(
-    keys: dict[str, list[str]],
     own: dict[str, list[str]],
     header: list[str],
     table: np.ndarray,

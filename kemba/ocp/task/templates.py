@@ -121,9 +121,8 @@ def closed_in_itself(task: Task, model: Model, others: Sequence[Requirement]) ->
     """
     if task.periodic is None:
         return []
-    mechanism, excepted = model.mechanism, task.periodic.excepted
-    inputs = [q for q in model.inputs.values() if q.binary]
-    listed = [*mechanism.coordinates, *mechanism.velocities, *model.states.values(), *inputs]
+    excepted = task.periodic.excepted
+    listed = [*model.state, *(q for q in model.inputs.values() if q.binary)]
     names = [q.name for q in listed]
     for name in (name for name in excepted if name not in names):
         raise ValueError(f"except: no state '{name}'; {suggest(name, names)}")
