@@ -72,7 +72,7 @@ class RunFolder:
             "status": "running",
             "task": task,
             "command": list(sys.argv if command is None else command),
-            "started": _now(),
+            "started": now(),
             "finished": None,
             "versions": versions(),
             "inputs": {str(name): sha256(name) for name in inputs},
@@ -82,7 +82,7 @@ class RunFolder:
 
     def finish(self, status: str, **facts: Any) -> None:
         """Replace the manifest by its final form; `facts` are further entries."""
-        self.manifest.update(status=status, finished=_now(), **facts)
+        self.manifest.update(status=status, finished=now(), **facts)
         write_json(self.path / MANIFEST, self.manifest)
         unlock(self.lock, self.path)
         self.lock = None
@@ -187,7 +187,8 @@ def versions() -> dict[str, str]:
     return found | {name: metadata.version(name) for name in LIBRARIES}
 
 
-def _now() -> str:
+def now() -> str:
+    """The date and time, as manifests write it."""
     return datetime.now(timezone.utc).isoformat(timespec="seconds")
 
 

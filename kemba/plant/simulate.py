@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError, suggest
-from kemba.model import Model
+from kemba.model import Model, load_model
 from kemba.plant.commands import Commands, delayed
 from kemba.plant.equations import equations_of, share_equations
 from kemba.plant.kernel.machine import LONGEST_STEP, Array
@@ -249,6 +249,4 @@ def wait_for_compiler(tell: Tell) -> None:
 
 def compile_kernel() -> None:
     """Have the kernel compiled and kept, by a simulation that is as short as any."""
-    from kemba.model import load_model
-
     run(load_model("plant"), duration=2e-3)

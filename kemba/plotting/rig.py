@@ -198,17 +198,17 @@ def plot_prediction(
     """The force of a log and what a simpler model predicts for its motion and valves (Fig. 7)."""
     r2, rms = agreement(predicted, log)
     sources = [Source(name, log), Source("approximate model", predicted)]
-    chosen = [PANELS[2], PANELS[4]]
+    force, valves = (p for p in PANELS if p.label in ("piston F [N]", "valve"))
     figure = paper_figure(2.9, figure=figure)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=[4, 1])
-    draw_panel(top, chosen[0], sources, {})
+    draw_panel(top, force, sources, {})
     for line, source in zip(top.lines, sources, strict=True):
         line.set(label=source.name, linewidth=0.9)
     top.lines[1].set_linestyle((0, (3.2, 1.4)))
-    top.set_ylabel(chosen[0].label)
+    top.set_ylabel(force.label)
     top.set_title(f"R² {r2:.3f}, RMS {rms:.1f} N", loc="left")
     key_above(top)
-    draw_panel(bottom, chosen[1], sources[:1], {})
+    draw_panel(bottom, valves, sources[:1], {})
     bottom.set_xlabel("time [s]")
     return figure
 

@@ -26,17 +26,6 @@ BESIDE = 2.0  # m of ground before and behind the motion
 AROUND = 0.3  # s, shown before and after the ghost moves
 
 
-def write_view(
-    source: Source, path: str | Path, model: str | None = None, ghost: Source | None = None
-) -> Path:
-    """Write a page with the motion of a source in 3-D; it needs no other file. `ghost`: a second
-    motion, drawn pale.
-
-    Raises KembaError when columns are missing or the file cannot be written.
-    """
-    return write_page(path, source.name, stage(source, model, ghost))
-
-
 def view_run(
     run: str | Path,
     out: str | Path | None = None,
@@ -45,7 +34,8 @@ def view_run(
     column_map: str | Path | None = None,
     plan: str | Path | None = None,
 ) -> Path:
-    """The page of a run folder or a log; written to `out` or as a new file beside the motion.
+    """A page with the motion of a run folder or a log in 3-D, which needs no other file; written
+    to `out` or as a new file beside the motion.
 
     `column_map`: for the log of another program. `plan`: the run that is drawn as a ghost. Raises
     KembaError where columns are missing or the page cannot be written.
@@ -53,7 +43,7 @@ def view_run(
     source, ghost = shown(run, column_map, plan)
     assert source.path is not None
     place = place_for(out, source.path.with_name("view.html"), force)
-    return write_view(source, place, model, ghost)
+    return write_page(place, source.name, stage(source, model, ghost))
 
 
 def shown(

@@ -14,10 +14,8 @@ from kemba.plotting.style import svg_text
 from kemba.report.charts import pairs, table
 from kemba.report.verdict import ReviewVerdict
 from kemba.report.view import write_page
-from kemba.rounds.outcome import ExpectedApex, effects
+from kemba.rounds.outcome import ExpectedApex
 from kemba.rounds.round import Round
-
-Rows = Iterable[tuple[str, Any]]
 
 
 def write_learning(found: Round, folder: Path) -> Path:
@@ -90,16 +88,8 @@ def _band(band: ExpectedApex | None) -> str:
 def _growth(found: Round) -> str:
     """The model of every round: what was added, its error before and after, and where the run that
     was learnt from came down beside what was expected of it."""
-    now = {
-        "round": found.past.round,
-        "effects": effects(found.answer),
-        "compare_before": found.compare_before,
-        "compare_after": found.compare_after,
-        "executed_apex_m": found.executed_apex,
-        "was_expected": found.was_expected and found.was_expected.json(),
-    }
     rows = []
-    for told in (*found.past.history, now):
+    for told in (*found.past.history, {"round": found.past.round, **found.facts}):
         band = ExpectedApex.of(told.get("was_expected"))
         apex = told.get("executed_apex_m")
         inside = "" if band is None or apex is None else "yes" if band.holds(apex) else "no"

@@ -229,6 +229,21 @@ class Round:
         """Whether there is a new plan that its model's executions confirm."""
         return bool(self.result.get("confirmed"))
 
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What later rounds are told of this one, beside its runs and logs."""
+        return {
+            "verdict": self.answer.verdict,
+            "added": list(self.answer.added),
+            "model": self.model,
+            "executed_apex_error_m": self.executed_apex_error,
+            "executed_apex_m": self.executed_apex,
+            "was_expected": self.was_expected and self.was_expected.json(),
+            "effects": outcome.effects(self.answer),
+            "compare_before": self.compare_before,
+            "compare_after": self.compare_after,
+        }
+
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints."""
         return {
@@ -389,18 +404,7 @@ def _planned(
 ) -> Round:
     """The target planned with the learnt model, from the old plan, and its table corrected."""
     past = found.past
-    facts = {
-        "verdict": found.answer.verdict,
-        "added": list(found.answer.added),
-        "model": found.model,
-        "executed_apex_error_m": found.executed_apex_error,
-        "executed_apex_m": found.executed_apex,
-        "was_expected": found.was_expected and found.was_expected.json(),
-        "effects": outcome.effects(found.answer),
-        "compare_before": found.compare_before,
-        "compare_after": found.compare_after,
-    }
-    folder.manifest |= entry(past, facts)
+    folder.manifest |= entry(past, found.facts)
     origin = origin_of(past.runs[past.last].path)
     result = solve_into(folder, task, document, listener, Approach(origin=origin))
     result = {**result, "confirmed": result["good"]}

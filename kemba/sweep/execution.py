@@ -41,12 +41,8 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
     plant, planned = (
         model_name(expansion, m) for m in (block.plant, _model(expansion, name, block))
     )
-    base = Document(
-        {
-            **_planned(expansion, name, block),
-            **block.conditions.model_dump(exclude_none=True, exclude_unset=True),
-        }
-    )
+    given = block.conditions.model_dump(exclude_none=True, exclude_unset=True)
+    base = Document({**_planned(expansion, name, block), **given})
     works = []
     for values in sample(block, name, expansion.sweep.seed):
         conditions = parse(expansion.varied(base, name, values), Conditions)
@@ -87,8 +83,6 @@ def _planned(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, 
 
 def _model(expansion: Expansion, name: str, block: ExecuteBlock) -> str:
     """The model that the plan was made with: its robot and own effects are the plant's too."""
-    from kemba.ocp.task.task import parse_task
-
     if block.run is None:
         return parse_task(expansion.task_document(name)).model
     file = _run_folder(expansion, block.run) / "task.yaml"
@@ -103,7 +97,6 @@ def _run_folder(expansion: Expansion, run: str) -> Path:
 
 def _plan_folder(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> Path:
     """The folder of the plan to execute. Raises KembaError when there is no good plan."""
-    from kemba.ocp.task.task import parse_task
     from kemba.solve import Approach, Listener, best_plan
 
     if block.run is not None:

@@ -2,8 +2,8 @@
 
 import csv
 import sys
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from kemba.config import Document, dump_yaml
 from kemba.errors import KembaError
 from kemba.files import atomic_text, write_json
 from kemba.folders import LOCK
-from kemba.runs import read_manifest, versions
+from kemba.runs import now, read_manifest, versions
 from kemba.scenarios.share import wilson
 from kemba.sweep.cases import Case, Record, Sweep
 from kemba.sweep.farm import machine
@@ -125,17 +125,14 @@ def _block(rows: Rows, best: Mapping[str, float]) -> dict[str, Any]:
     succeeded = sum(bool(record["good"]) for record in records)
     low, high = wilson(succeeded, len(rows))
     ratios = [r for case, record in rows if (r := cost_ratio(case, record, best)) is not None]
-    counts: dict[str, int] = {}
-    for _, record in rows:
-        status = record["status"] if record else "missing"
-        counts[status] = counts.get(status, 0) + 1
+    counts = Counter(record["status"] if record else "missing" for _, record in rows)
     return {
         "cases": len(rows),
         "succeeded": succeeded,
         "rate": succeeded / len(rows),
         "interval": [low, high],
-        "unfinished": sum(counts.get(status, 0) for status in UNFINISHED),
-        "statuses": counts,
+        "unfinished": sum(counts[status] for status in UNFINISHED),
+        "statuses": dict(counts),
         **{name: spread(_column(rows, name)) for name in (*TIMES, "iterations")},
         "cost_ratio": spread(ratios),
     }
@@ -211,7 +208,7 @@ def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Pat
         "sweep": sweep.name,
         "status": "running",
         "command": sys.argv,
-        "started": _now(),
+        "started": now(),
         "machine": machine(),
         "versions": versions(),
     }
@@ -226,7 +223,7 @@ def write_results(
     """Table and summary of a sweep, as far as it came; the summary is returned."""
     summary = summarise(sweep, cases, records)
     manifest = read_manifest(path)
-    manifest |= {"status": status, "finished": _now(), "sentence": summary["sentence"]}
+    manifest |= {"status": status, "finished": now(), "sentence": summary["sentence"]}
     table = _table(cases, records)
     facts = {key: manifest[key] for key in ("machine", "versions", "started", "finished")}
     write_json(path / "results.json", {**summary, "status": status, **facts, "cases": table})
@@ -270,7 +267,3 @@ def _write_csv(table: list[dict[str, Any]], path: Path) -> None:
 def harmless(cell: Any) -> Any:
     """A cell that no spreadsheet takes for a formula and runs."""
     return f"'{cell}" if isinstance(cell, str) and cell.startswith(FORMULA) else cell
-
-
-def _now() -> str:
-    return datetime.now(timezone.utc).isoformat(timespec="seconds")

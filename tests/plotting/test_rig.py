@@ -60,7 +60,8 @@ def test_random_motion_beside_the_approximate_model() -> None:
     rig = RandomRig(name="random", duration=1.0)
     itself = plot_rig(logs(rig)).axes[0]
     assert itself.get_title("left") == "R² 1.000, RMS 0.0 N"
-    top = plot_rig(logs(rig, "plant")).axes[0]
+    top, bottom = plot_rig(logs(rig, "plant")).axes
+    assert [label.get_text() for label in bottom.get_yticklabels()] == ["retract", "extend"]
     r2 = float(top.get_title("left").split()[1].rstrip(","))
     assert 0.9 < r2 < 1.0
     assert top.get_legend_handles_labels()[1][1] == "approximate model"
