@@ -49,7 +49,8 @@ FOUND = """## What was found
   five times the usual iterations); all other settings of the stages change its cost only (column
   *cost*). The program has many local optima, and each change may lead to another one. No threshold
   can be derived that avoids this. What helps is to begin from plans that are known to be cheap
-  ([earlier runs](../../docs/continuing.md)), or from several starts (`kemba-opt solve TASK --starts 4`).
+  ([earlier runs](../../docs/continuing.md)), or from several starts
+  (`kemba-opt solve TASK --starts 4`).
 """
 
 Record = dict[str, Any]
