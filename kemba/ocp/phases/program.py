@@ -152,6 +152,13 @@ class PhaseProgram:
         """Column of a force of the whole robot among the half's."""
         return int(np.flatnonzero(self.reduction.B["lam"][force])[0])
 
+    @property
+    def frictions(self) -> list[tuple[int, int]]:
+        """Columns of every contact's forward and backward friction in rows of scaled variables."""
+        first = self.layout.slices["lam"].start
+        pairs = [(c.friction.forward, c.friction.backward) for c in self.constraints if c.friction]
+        return [(first + self.place(a), first + self.place(b)) for a, b in pairs]
+
     def add(
         self, label: str, z: ca.SX, g: ca.SX, low: float, high: float, columns: list[np.ndarray]
     ) -> None:

@@ -41,6 +41,7 @@ from kemba.trajectory import Trajectory
 
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
 UNFIT = "no order of its contacts and stops was found that holds"
+NEAREST, BEST, FINEST = range(3)  # steps of an elastic program
 SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
@@ -169,8 +170,8 @@ class Refiner:
         while phases not in self.seen and self.left > 0:
             self.seen.append(phases)
             self.tell("phases: changing the order of contacts and valves")
-            for solved in (self.nearest, self.best, self.finest):
-                program, near = solved(phases, start)
+            for step in (NEAREST, BEST, FINEST):
+                program, near = self.elastic(phases, start, step)
                 start, found = (program, near.Y), self._ended(program, near)
                 if not near.solved:
                     return found
@@ -186,28 +187,18 @@ class Refiner:
             phases = better
         return found
 
-    def nearest(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
-        """The elastic program of the coarser scheme, near the start."""
-        settings = Refining.current()
-        program, x = self.build(phases, start, RADAU3, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_elastic))
-        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu}
-        return program, self._solve(program, x, options)
-
-    def best(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
-        """The elastic program of the coarser scheme, for the task's cost."""
-        settings = Refining.current()
-        program, x = self.build(phases, start, RADAU3, settings.price)
-        options = {**rough(settings.elastic_iterations), "mu_init": settings.elastic_mu / 10}
+    def elastic(
+        self, phases: Sequence[Phase], start: Start, step: int
+    ) -> tuple[PhaseProgram, Iterate]:
+        """The elastic program of a step: near the start by the coarser scheme, then for the task's
+        cost, then for that near the start by the finer scheme."""
+        settings, scheme = Refining.current(), RADAU5 if step == FINEST else RADAU3
+        program, x = self.build(phases, start, scheme, settings.price)
+        if step != BEST:
+            x = program.proximal(x, settings.near_elastic)
+        options = (warm if step == FINEST else rough)(settings.elastic_iterations)
+        options["mu_init"] = settings.elastic_mu / 10**step
         return program, self._solve(program, program.loosened(x), options)
-
-    def finest(self, phases: Sequence[Phase], start: Start) -> tuple[PhaseProgram, Iterate]:
-        """The elastic program of the finer scheme, for the task's cost near the start."""
-        settings = Refining.current()
-        program, x = self.build(phases, start, RADAU5, settings.price)
-        x = program.loosened(program.proximal(x, settings.near_elastic))
-        options = {**warm(settings.elastic_iterations), "mu_init": settings.elastic_mu / 100}
-        return program, self._solve(program, x, options)
 
     def exact(self, phases: Sequence[Phase], start: Start) -> Refined:
         """The solution nearest to the plan by the coarser scheme, then the best one by both."""

@@ -71,13 +71,9 @@ def _impulses(program: PhaseProgram, x: np.ndarray) -> dict[str, np.ndarray]:
 
 def _split_friction(program: PhaseProgram, Y: np.ndarray) -> None:
     """One signed friction force as its forward and backward part."""
-    offset = program.layout.slices["lam"].start
-    for constraint in program.constraints:
-        if constraint.friction is not None:
-            forward = offset + program.place(constraint.friction.forward)
-            backward = offset + program.place(constraint.friction.backward)
-            force = Y[:, forward].copy()
-            Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
+    for forward, backward in program.frictions:
+        force = Y[:, forward].copy()
+        Y[:, forward], Y[:, backward] = np.maximum(force, 0.0), np.maximum(-force, 0.0)
 
 
 def _slip_speeds(

@@ -16,12 +16,8 @@ def node_rows(program: PhaseProgram, plan: Trajectory) -> np.ndarray:
     groups = arrays(program.model, plan)
     groups["h"] = np.diff(plan.time, prepend=plan.time[0])[:, None]
     Y = program.layout.pack(groups)
-    offset = program.layout.slices["lam"].start
-    for constraint in program.constraints:
-        if constraint.friction is not None:
-            forward = offset + program.place(constraint.friction.forward)
-            backward = offset + program.place(constraint.friction.backward)
-            Y[:, forward] -= Y[:, backward]
+    for forward, backward in program.frictions:
+        Y[:, forward] -= Y[:, backward]
     return Y
 
 
