@@ -39,16 +39,6 @@ class PairTable:
     free_speeds: tuple[tuple[int, Array], ...] = ()
 
     @cached_property
-    def is_gap(self) -> Array:
-        """Whether each row is a position pair."""
-        return np.isin(np.arange(len(self.labels)), self.gaps)
-
-    @cached_property
-    def compliant(self) -> Array:
-        """The rows of compliant gaps."""
-        return self.gaps[~self.rigid]
-
-    @cached_property
     def ungapped(self) -> Array:
         """Whether each row belongs to an instance without gaps, which cannot open."""
         return ~np.isin(self.group, self.group[self.gaps])

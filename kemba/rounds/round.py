@@ -14,7 +14,6 @@ from kemba.errors import KembaError, enumerated
 from kemba.files import sha256, write_json
 from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
-from kemba.identify.discover import Discovery
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
 from kemba.logs import load_map
@@ -192,7 +191,6 @@ class Round:
     past: Past
     model: str
     answer: Answer
-    discovery: Discovery | None
     compare_before: float
     compare_after: float
     planned: FlownJump
@@ -335,7 +333,7 @@ def _learnt(
     shutil.rmtree(out, ignore_errors=True)  # of a round that was killed
     out.mkdir()
     here = as_executed(old.model, old, out / "model_of_the_run.yaml")
-    answer, discovery = discover_logs(
+    answer, _ = discover_logs(
         past.logs, asked.holdout, here, asked.column_map, asked.time_limit / 2.0, tell, out
     )
     if answer.verdict == "bad-data":
@@ -355,7 +353,6 @@ def _learnt(
         past=past,
         model=model,
         answer=answer,
-        discovery=discovery,
         compare_before=answer.error_before,
         compare_after=answer.error_after,
         planned=flight_of(plan, machine),

@@ -11,7 +11,6 @@ from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bin
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import (
     Hint,
-    Response,
     Tolerant,
     conflicts,
     lacking,
@@ -57,7 +56,6 @@ class Comparison:
     tolerant_ratio: float = float("nan")
     tolerable: bool = False
     hints: tuple[Hint, ...] = ()
-    responses: tuple[Response, ...] = ()
     force_profiles: tuple[ForceProfile, ...] = ()
     missing: tuple[MissingForce, ...] = ()
     plan: Mapping[str, float] = field(default_factory=dict)
@@ -99,7 +97,7 @@ def compare(
     window = aggregation_windows(problem, rows, region)
     sums = window.sums(r)
     known = slopes(problem, start)
-    responses = tuple(lagged(problem, rows, r / np.sqrt(problem.expected_power())))
+    responses = lagged(problem, rows, r / np.sqrt(problem.expected_power()))
     forces = tuple(force_profiles(problem, r))
     sent = [s.hint for s in responses if s.certain]
     tolerant = within_tolerance(r, known)
@@ -113,7 +111,6 @@ def compare(
         ratio,
         clean and not any(profile.matters for profile in force_profiles(problem, tolerant.left)),
         (*sent, *conflicts(rows, r, known)),
-        responses,
         forces,
         tuple(problem.missing_force(start)),
     )
