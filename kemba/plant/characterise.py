@@ -30,10 +30,6 @@ class Estimate:
     low: float = float("nan")
     high: float = float("nan")
 
-    def as_dict(self) -> dict[str, float]:
-        """The figures as plain data for JSON."""
-        return {"value": self.value, "low": self.low, "high": self.high}
-
 
 def mean(values: Array) -> Estimate:
     """The mean of repeated values (n,)."""

@@ -138,19 +138,21 @@ def read_controller(source: Trajectory | str | Path) -> Trajectory:
 def hip_control(model: Model, table: Trajectory, gains: Gains) -> JointControl:
     """The hips follow a controller table within what the motors can give (eq. 10)."""
     legs = model.mechanism.legs
-    motors = [
-        next((e for e in model.effects if isinstance(e, Motor) and e.on in (leg, None)), None)
-        for leg in legs
-    ]
     wanted = [[_column(table, f"{leg}/hip/{name}") for name in ("q", "w", "tau")] for leg in legs]
     return JointControl(
         joints=tuple(f"{leg}/hip" for leg in legs),
         times=table.time,
         wanted=np.ascontiguousarray(np.array(wanted).transpose(2, 0, 1)),
-        limits=np.array([motor_limits(motor) for motor in motors]).reshape(-1, 3),
+        limits=np.array([motor_limits(motor_of(model, leg)) for leg in legs]).reshape(-1, 3),
         K_p=gains.K_p,
         K_d=gains.K_d,
     )
+
+
+def motor_of(model: Model, leg: str) -> Motor | None:
+    """The motor of a leg's hip; None without one."""
+    motors = (e for e in model.effects if isinstance(e, Motor) and e.on in (leg, None))
+    return next(motors, None)
 
 
 def motor_limits(motor: Motor | None) -> tuple[float, float, float]:

@@ -26,21 +26,21 @@ def as_json(found: Characteristics) -> dict[str, Any]:
     """Everything that was found, with the paper's values where it has them."""
     return {
         "table_1": [
-            {"chamber": name, "x_m": x, **estimate.as_dict(), "unit": "s", "paper": paper}
+            {"chamber": name, "x_m": x, **vars(estimate), "unit": "s", "paper": paper}
             for name, x, estimate, paper in _rises(found)
         ],
         "table_2": [
             {
                 "mode": line.mode,
                 "supply_pa": line.supply,
-                "F_static": {**line.F_static.as_dict(), "unit": "N", "paper": paper[0]},
-                "c_d": {**line.c_d.as_dict(), "unit": "N.s.m-1", "paper": paper[1]},
+                "F_static": {**vars(line.F_static), "unit": "N", "paper": paper[0]},
+                "c_d": {**vars(line.c_d), "unit": "N.s.m-1", "paper": paper[1]},
                 "r2": line.r2,
             }
             for line, paper in _forces(found)
         ],
         "dead_time": {
-            name: {**estimate.as_dict(), "unit": "s", "paper": PAPER_DEAD_TIME}
+            name: {**vars(estimate), "unit": "s", "paper": PAPER_DEAD_TIME}
             for name, estimate in (found.rises.dead.items() if found.rises else ())
         },
         "rise_r2": found.rises.r2 if found.rises else None,

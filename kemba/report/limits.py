@@ -11,6 +11,7 @@ from kemba.effects.mechanics.hip import Motor
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.mechanism import Cylinder
 from kemba.model import Model
+from kemba.plant.controller import motor_of
 from kemba.plotting.source import Machine
 from kemba.report.charts import Book, Chart, Curve, Track, colour, table
 from kemba.report.motion import Events
@@ -20,7 +21,6 @@ from kemba.report.use import (
     air_drawn,
     envelope,
     full_for,
-    motor_of,
     pressure,
     rate,
     slides,

@@ -12,6 +12,7 @@ from kemba.events import runs
 from kemba.identify.problem.noise import difference_sigma
 from kemba.mechanism import Cylinder
 from kemba.model import Model
+from kemba.plant.controller import motor_of
 from kemba.plotting.source import EXACT, Machine, Mask
 from kemba.report.charts import Track
 from kemba.trajectory import Array, Trajectory
@@ -35,12 +36,6 @@ class Use:
     speed: Array
     motor: Array
     cone: Array
-
-
-def motor_of(model: Model, leg: str) -> Motor | None:
-    """The motor of a leg's hip."""
-    own = (i.effect for i in model.instances if i.leg in (leg, None))
-    return next((effect for effect in own if isinstance(effect, Motor)), None)
 
 
 def use_of(track: Track, model: Model, machine: Machine, leg: str) -> Use:
