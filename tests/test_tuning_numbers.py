@@ -113,7 +113,6 @@ CONSTANTS = {  # file -> names, why
     "plant/kernel/events.py": ("FREE TOUCHED TOO_LONG", "names of endings"),
     # rounding and sizes of memory
     "ocp/transcription/first_node.py": ("SAME", "rounding"),
-    "plant/commands.py": ("SAME_TIME", "rounding of times"),
     "plant/player.py": ("ROOM", "size of memory"),
     # limits of files, messages and reports
     "effects/expression.py": ("TRIED TRIED_AT_LEG", "values at which a formula is tried"),
