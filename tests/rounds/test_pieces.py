@@ -177,7 +177,7 @@ def a_round(verdict: str, added: list[str], good: bool, after: float = 1.2) -> R
     result = {"confirmed": good, "sentence": "FAILED: the simulated robot tips over."}
     past = SimpleNamespace(round=2)
     flown = (planned, [executed], SIMULATED, planned)
-    return Round(past, "m.yaml", answer, None, 3.0, after, *flown, result=result)  # type: ignore
+    return Round(past, "m.yaml", answer, 3.0, after, *flown, result=result)  # type: ignore
 
 
 @pytest.mark.parametrize(
