@@ -36,6 +36,9 @@ class RefitSettings:
     absurd = 1e6  # residuals are clipped at so many sigmas: finite, beyond all data
 
 
+INSIDE = 1e-9  # distance from a bound, in widths: an effect that is as good as absent stays on
+
+
 @dataclass(frozen=True)
 class Fit:
     """The best theta of a hypothesis.
@@ -130,8 +133,9 @@ class _LeastSquares:
     def run(self) -> Fit:
         settings = self.settings
         lower, upper = self._bounds()
+        lower, upper = lower + INSIDE, upper - INSIDE
         x = np.array([*self._nuisance_start(), *(self._in(k, self.start[k]) for k in self.own)])
-        x = np.clip(x, lower + 1e-9, upper - 1e-9)
+        x = np.clip(x, lower, upper)
         r, damping = self._residual(x), 0.0
         at, slopes = self._slopes(x, r)
         gram, slope = self._normal_equations(x, r, at, slopes)
