@@ -32,14 +32,16 @@ class Buffered:
     """A function of vectors with dense results, called without copies: twenty times sooner."""
 
     def __init__(self, function: ca.Function) -> None:
-        self._buffer, self._evaluate = function.buffer()
+        buffer: Any
+        buffer, self._evaluate = function.buffer()
         self._given = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
         flat = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
         self._found = [a.reshape(function.size_out(i), order="F") for i, a in enumerate(flat)]
         for i, given in enumerate(self._given):
-            self._buffer.set_arg(i, memoryview(given))
+            buffer.set_arg(i, given.data)
         for i, found in enumerate(flat):
-            self._buffer.set_res(i, memoryview(found))
+            buffer.set_res(i, found.data)
+        self._buffer = buffer  # the evaluation holds no reference to it
 
     def __call__(self, *vectors: Array) -> list[Array]:
         """The results, which hold until the next call."""

@@ -62,7 +62,7 @@ class Frozen:
     @cached_property
     def gram(self) -> Array:
         """Products (k, k) of the slopes with each other."""
-        return self.jacobian.T @ self.jacobian
+        return np.asarray(self.jacobian.T @ self.jacobian)
 
 
 def refit(

@@ -135,9 +135,7 @@ def weighted(columns: Sequence[Array], measured: Array, counts: Array) -> tuple[
     return a, (measured * weight).ravel()
 
 
-def lag_noise(
-    memories: Sequence[float], h: Array, draws: int, rng: np.random.Generator
-) -> Array:
+def lag_noise(memories: Sequence[float], h: Array, draws: int, rng: np.random.Generator) -> Array:
     """(n, L, memories, draws): first-order lags of the same white noise, of unit sigma; `h` (n, L)
     and `memories` [s], of which 0 is white."""
     white = rng.standard_normal((*h.shape, 1, draws))
