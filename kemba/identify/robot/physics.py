@@ -146,7 +146,7 @@ class Physics:
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
         states = list(self.model.states.values())
         self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
-        self._follows = ca.jacobian_sparsity(rate, node.s)
+        self._rate = rate
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
         self._maps: dict[str, SampleMap] = {}
@@ -225,9 +225,9 @@ class Physics:
         key = tuple(i for i in self._switches if p[i] == 0.0)
         if key not in self._needed:
             zero = self.p[list(key)]
-            bare = ca.substitute(self._force, zero, ca.SX.zeros(zero.shape))
-            found = set(ca.jacobian_sparsity(bare, self.node.s).get_triplet()[1])
-            pairs = list(zip(*self._follows.get_triplet(), strict=True))
+            bare = ca.substitute([self._force, self._rate], [zero], [ca.SX.zeros(zero.shape)])
+            force, follows = (ca.jacobian_sparsity(x, self.node.s).get_triplet() for x in bare)
+            found, pairs = set(force[1]), list(zip(*follows, strict=True))
             while more := {of for state, of in pairs if state in found} - found:
                 found |= more
             self._needed[key] = np.array(sorted(found), dtype=int)
