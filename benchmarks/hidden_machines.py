@@ -42,9 +42,10 @@ REST = 0.3  # s after the table, so that a landing can be judged
 
 @dataclass(frozen=True)
 class Jump:
-    """One execution: apex error [m] against the plan, as it truly is; whether the landing is kept;
-    the log that the sensors wrote."""
+    """One execution: apex [m] and its error against the plan, as they truly are; whether the
+    landing is kept; the log that the sensors wrote."""
 
+    apex: float
     apex_error: float
     landed: bool
     log: Path
@@ -52,10 +53,12 @@ class Jump:
 
 @dataclass(frozen=True)
 class HiddenMachine:
-    """A robot with three to five hidden effects, drawn by its seed."""
+    """A robot with three to five hidden effects, drawn by its seed; `chambers`: how its air flows,
+    first_order as in the planning model, or through an orifice."""
 
     seed: int
     size: float = SIZE
+    chambers: str = "first_order"
 
     @cached_property
     def effects(self) -> list[dict[str, Any]]:
@@ -77,22 +80,22 @@ class HiddenMachine:
         for repeat in range(REPEATS):
             kick = np.random.default_rng([self.seed, 2, visit, repeat])
             push = coloured(script.ticks, DISTURBANCE, kick)
-            truth = run_twin(script, self.effects, self.robot, pushes=push)
+            truth = run_twin(script, self.effects, self.robot, self.chambers, pushes=push)
             columns = measure.robot_log(truth, Sensors(), (), kick)
             path = logs.write(folder / f"log-{repeat + 1}.csv", columns)
             noise = {name: Sensors().spread(name.split(" [")[0]) for name in columns
                      if measure.base(name.split(" [")[0]) in measure.CHANNELS}  # fmt: skip
             logs.sidecar(path, "robot", 10 * visit + repeat, run.name, noise)
             apex = float(truth.y[:, 1].max())
-            found.append(Jump(apex - float(plan["body/z"].max()), landed(truth), path))
+            found.append(Jump(apex, apex - float(plan["body/z"].max()), landed(truth), path))
         return found
 
 
-def machine(seed: int, run: Path, folder: Path) -> HiddenMachine:
+def machine(seed: int, run: Path, folder: Path, chambers: str = "first_order") -> HiddenMachine:
     """The machine of a seed, its effects as large as it can bear in its first jumps."""
     size = SIZE
     for _ in range(TRIES):
-        found = HiddenMachine(seed, size)
+        found = HiddenMachine(seed, size, chambers)
         if all(jump.landed for jump in found.jumps(run, folder, 0)):
             break
         size *= SMALLER

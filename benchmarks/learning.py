@@ -5,6 +5,10 @@ to it, three rounds of three jumps each: `learn` as the command does it, iterati
 (the correction of kemba/rounds on the model as it is), and a plain least-squares fit of all
 parameters at once. Every finished way of a machine is kept in the record; an interrupted study
 goes on, `--part 1/2` with every second machine. `--page` only writes the section of docs/learn.md.
+
+A hundred others, every second one with air that flows through orifices, and two rounds of `learn`:
+
+    python benchmarks/learning.py --mixed --machines 100 --record learning_mixed.jsonl
 """
 
 import argparse
@@ -22,7 +26,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 from block import put_block
 from hidden_machines import HiddenMachine, machine
-from learning_page import section
+from learning_page import mixed, section
 from scipy.optimize import lsq_linear
 
 from kemba.config import dump_yaml
@@ -46,8 +50,10 @@ from kemba.sweep.farm import machine as this_computer
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "learn.md"
 MARKS = ("<!-- machines: written by benchmarks/learning.py -->", "<!-- end of machines -->")
+MIXED = ("<!-- mixed machines: written by benchmarks/learning.py --mixed -->",
+         "<!-- end of mixed machines -->")  # fmt: skip
 ROUNDS = 3
-SEED = 7000
+SEED, OTHERS = 7000, 7100
 
 MOST = 10.0  # sizes by which the plain fit may change a parameter, so that the model can be built
 LIMIT = 40.0  # s for a plan of the plain fit, whose models are far from any; usual plans take 2 s
@@ -62,7 +68,13 @@ def by_learning(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
     folder = RunFolder.create(new, "jump", [*logs])
     found = learn(Asked([run], logs[-3:], task), folder, Listener())
     folder.finish("finished" if found.good else "failed")
-    return {"verdict": found.answer.verdict, "added": list(found.answer.added), "good": found.good}
+    band = found.next_expected
+    return {
+        "verdict": found.answer.verdict,
+        "added": list(found.answer.added),
+        "good": found.good,
+        "expected_m": [band.low, band.high] if band else None,
+    }
 
 
 def by_correction(run: Path, logs: list[Path], new: Path) -> dict[str, Any]:
@@ -137,17 +149,18 @@ WAYS: dict[str, Step] = {
 }
 
 
-def study(hidden: HiddenMachine, way: str, first: Path, folder: Path) -> dict[str, Any]:
-    """Three rounds of one way on one machine: apex errors of every jump and what was learnt."""
+def study(hidden: HiddenMachine, way: str, first: Path, folder: Path, last: int) -> dict[str, Any]:
+    """Rounds up to the `last` of one way on one machine: apexes of jumps, and what was learnt."""
     began = time.process_time()
     run, logs, rounds, facts = folder / "run-0", [], [], []
     shutil.copytree(first, run)
-    for number in range(ROUNDS + 1):
+    for number in range(last + 1):
         jumps = hidden.jumps(run, folder / f"logs-{number}", number)
-        rounds.append({"apex_error_m": [j.apex_error for j in jumps],
+        rounds.append({"apex_m": [j.apex for j in jumps],
+                       "apex_error_m": [j.apex_error for j in jumps],
                        "landed": [j.landed for j in jumps]})  # fmt: skip
         logs += [jump.log for jump in jumps]
-        if number == ROUNDS:
+        if number == last:
             break
         new = folder / f"run-{number + 1}"
         try:
@@ -170,7 +183,9 @@ def main() -> None:
     parser.add_argument("--run", type=Path, help="plan to begin with; jump.yaml solved anew")
     parser.add_argument("--keep", type=Path, help="where runs and logs are kept")
     parser.add_argument("--page", action="store_true", help="only write the section")
+    parser.add_argument("--mixed", action="store_true", help="the hundred others")
     asked = parser.parse_args()
+    begin, last, ways = (OTHERS, 2, ["learn"]) if asked.mixed else (SEED, ROUNDS, asked.ways)
     rows = _read(asked.record)
     if not asked.page:
         with tempfile.TemporaryDirectory() as scratch:
@@ -178,22 +193,24 @@ def main() -> None:
             first = asked.run or _planned(room / "first")
             done = {(row["seed"], row["way"]) for row in rows}
             part, parts = map(int, asked.part.split("/"))
-            for seed in range(SEED, SEED + asked.machines)[part - 1 :: parts]:
-                missing = [way for way in asked.ways if (seed, way) not in done]
-                hidden = machine(seed, first, room / f"{seed}" / "trial") if missing else None
+            for seed in range(begin, begin + asked.machines)[part - 1 :: parts]:
+                missing = [way for way in ways if (seed, way) not in done]
+                chambers = "orifice" if asked.mixed and seed % 2 else "first_order"
+                trial = room / f"{seed}" / "trial"
+                hidden = machine(seed, first, trial, chambers) if missing else None
                 for way in missing:
                     assert hidden is not None
                     folder = room / f"{seed}" / way.replace(" ", "-")
                     shutil.rmtree(folder, ignore_errors=True)
-                    found = study(hidden, way, first, folder)
+                    found = study(hidden, way, first, folder, last)
                     kinds = {e["kind"]: e["parameters"] for e in hidden.effects}
-                    row = {"seed": seed, "way": way, "size": hidden.size, "effects": kinds,
-                           "machine": this_computer(), **found}  # fmt: skip
+                    row = {"seed": seed, "way": way, "size": hidden.size, "chambers": chambers,
+                           "effects": kinds, "machine": this_computer(), **found}  # fmt: skip
                     rows.append(row)
                     with asked.record.open("a", encoding="utf-8") as stream:
                         stream.write(json.dumps(row) + "\n")
                     print(_told(row), flush=True)
-    put_block(PAGE, *MARKS, [section(rows)])
+    put_block(PAGE, *(MIXED if asked.mixed else MARKS), [(mixed if asked.mixed else section)(rows)])
 
 
 def _planned(out: Path) -> Path:

@@ -2,15 +2,19 @@
 """How long `compare` and `discover` take on five logs of one second, as a user waits for them.
 
     python benchmarks/waiting.py --write
+    python benchmarks/waiting.py --beside OTHER/bin/kemba-opt --times 1 --write
 
 Logs of the second twin (tests/mujoco_twin), cut after 1 s: one hidden effect each, then five at
 once. Every command is a process of its own, figures included; on a machine with nothing else to do.
 Each case is asked three times: the median is told, in brackets the least and the greatest time.
+`--beside`: CPU seconds of `discover` beside those of another build on the same logs, one after the
+other, and which share of them is taken.
 """
 
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -40,6 +44,8 @@ SEED = 8100
 SECONDS = 1.0  # of each log
 PAGE = ROOT / "benchmarks" / "pages" / "benchmarks.md"
 BEGIN, END = "<!-- waiting: written by benchmarks/waiting.py -->", "<!-- end of waiting -->"
+BESIDE = ("<!-- beside: written by benchmarks/waiting.py --beside -->", "<!-- end of beside -->")
+OWN = Path(sys.executable).with_name("kemba-opt")
 
 
 def logs(effects: Sequence[str], seed: int, folder: Path) -> list[Path]:
@@ -53,24 +59,55 @@ def logs(effects: Sequence[str], seed: int, folder: Path) -> list[Path]:
     return paths
 
 
-def waited(verb: str, paths: Sequence[Path], *options: str) -> tuple[float, dict[str, Any]]:
-    """Seconds that a command takes, and its answer."""
-    program = str(Path(sys.executable).with_name("kemba-opt"))
-    command = [program, verb, *map(str, paths), "--json", "-q", *options]
-    begun = time.perf_counter()
+def waited(
+    verb: str, paths: Sequence[Path], *options: str, program: Path = OWN
+) -> tuple[float, float, dict[str, Any]]:
+    """Seconds of wall and of CPU that a command takes, and its answer."""
+    command = [str(program), verb, *map(str, paths), "--json", "-q", *options]
+    begun, cpu = time.perf_counter(), _children()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return time.perf_counter() - begun, json.loads(done.stdout)
+    return time.perf_counter() - begun, _children() - cpu, json.loads(done.stdout)
+
+
+def _children() -> float:
+    """CPU seconds of all processes that were waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def asked(effects: Sequence[str], seed: int) -> tuple[float, float, str]:
     """Seconds of `compare` and of `discover` on new logs, and what the answer says."""
     with tempfile.TemporaryDirectory() as name:
         paths = logs(effects, seed, Path(name))
-        compared, _ = waited("compare", paths)
-        found, answer = waited("discover", paths, "--out", str(Path(name) / "answer"))
+        compared, _, _ = waited("compare", paths)
+        found, _, answer = waited("discover", paths, "--out", str(Path(name) / "answer"))
     says = f"{answer['verdict']}: {', '.join(answer['found']) or 'no effect'}"
     print(f"{', '.join(effects)}: {compared:.1f} s, {found:.1f} s, {says}", flush=True)
     return compared, found, says
+
+
+def beside(other: Path, cases: int | None, times: int) -> Iterator[str]:
+    """Lines of the table of CPU seconds beside another build's program."""
+    chosen = [*((name,) for name in SINGLE), *SEVERAL][:cases]
+    yield "| hidden | discover, CPU s | the other build | share | they say |"
+    yield "|---|---:|---:|---:|---|"
+    shares = []
+    for i, effects in enumerate(chosen):
+        taken: dict[Path, list[float]] = {OWN: [], other: []}
+        says = []
+        with tempfile.TemporaryDirectory() as name:
+            paths = logs(effects, SEED + i, Path(name))
+            for number in range(times):
+                for program in taken:
+                    out = str(Path(name) / f"{number}-{program.parents[1].name}")
+                    _, cpu, answer = waited("discover", paths, "--out", out, program=program)
+                    taken[program].append(cpu)
+                    says.append(", ".join(answer["found"]) or answer["verdict"])
+        own, old = (median(seconds) for seconds in taken.values())
+        shares.append(own / old)
+        told = " / ".join(dict.fromkeys(says))
+        yield f"| {', '.join(effects)} | {own:.1f} | {old:.1f} | {own / old:.2f} | {told} |"
+    yield f"| median | | | {median(shares):.2f} | |"
 
 
 def table(cases: int | None, times: int) -> Iterator[str]:
@@ -104,7 +141,13 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put the table into the docs")
     parser.add_argument("--cases", type=int, help="so many of the beginning only")
     parser.add_argument("--times", type=int, default=3, help="how often each case is asked (3)")
+    parser.add_argument("--beside", type=Path, help="kemba-opt of another build")
     options = parser.parse_args()
+    if options.beside:
+        lines = printed(beside(options.beside, options.cases, options.times))
+        if options.write:
+            put_block(PAGE, *BESIDE, [*lines, "", f"Asked {options.times} times, on {machine()}."])
+        return
     lines = printed(table(options.cases, options.times))
     if options.write:
         how = f"Asked {options.times} times each: median, in brackets the range, on {machine()}."

@@ -185,27 +185,21 @@ def link_tolerances(joints: Iterable[Joint], shares: Mapping[str, float]) -> dic
 
 def link_forces(
     joints: Sequence[Joint],
-    figures: Iterable[str],
+    figures: Sequence[str],
     motion: tuple[ca.SX, ca.SX, ca.SX],
     gravity: float,
-) -> list[ca.SX]:
-    """Generalised forces (joints,) per share by which each of `figures` is off.
+) -> ca.SX:
+    """Generalised forces (joints, figures) per share by which each of `figures` is off.
 
     `motion`: angles, rates and accelerations (joints,) of the opened tree. Figures are named as in
-    `link_tolerances`. Raises ValueError for others.
+    `link_tolerances`.
     """
-    names = [joint.name for joint in joints]
-    forces = []
-    for name in figures:
-        link, _, figure = name.rpartition(".")
-        whole = _alone(joints, names.index(link))
-        mass = rnea([replace(joint, inertia=0.0) for joint in whole], *motion, gravity)
-        forces.append(mass if figure == "mass" else rnea(whole, *motion, gravity) - mass)
-    return forces
+    share = ca.SX.sym("share", len(figures))
+    off = {name: share[i] for i, name in enumerate(figures)}
 
+    def scaled(joint: Joint) -> Joint:
+        mass, inertia = (1.0 + off.get(f"{joint.name}.{f}", 0.0) for f in ("mass", "inertia"))
+        return replace(joint, mass=joint.mass * mass, inertia=joint.inertia * inertia)
 
-def _alone(joints: Sequence[Joint], kept: int) -> list[Joint]:
-    """The joints with one link only; all others weigh nothing, and no joint has a rotor."""
-    links = [replace(joint, armature=0.0) for joint in joints]
-    bare = [replace(joint, mass=0.0, inertia=0.0, com=np.zeros(2)) for joint in links]
-    return [*bare[:kept], links[kept], *bare[kept + 1 :]]
+    # the force is linear in what links weigh
+    return ca.jacobian(rnea([scaled(joint) for joint in joints], *motion, gravity), share)

@@ -101,9 +101,9 @@ def link_regressors(mechanism: Mechanism) -> ca.Function:
     rate = ca.jtimes(tree, m.q, m.v)
     acc = ca.jtimes(rate, m.q, m.v) + ca.jtimes(tree, m.q, m.a)
     joints = read_joints(build_pin_model(robot))
-    forces = link_forces(joints, m.tolerances, (tree, rate, acc), robot.gravity)
-    columns = [ca.jtimes(tree, m.q, force, True) for force in forces]
-    return ca.Function("regress", [m.q, m.v, m.a], [ca.horzcat(ca.SX(m.n, 0), *columns)])
+    forces = link_forces(joints, list(m.tolerances), (tree, rate, acc), robot.gravity)
+    columns = ca.jtimes(tree, m.q, forces, True)
+    return ca.Function("regress", [m.q, m.v, m.a], [columns])
 
 
 def reshaped(mechanism: Mechanism, offsets: Offsets, symbols: Offsets | None = None) -> Mechanism:

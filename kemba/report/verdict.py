@@ -201,9 +201,10 @@ def _flown(events: Sequence[Events], plan: Events | None) -> str:
     if not events:
         return ""
     heights = [e.apex for e in events]
+    if plan is None:  # the logs may be of different motions
+        ends = dict.fromkeys(f"{height:.3f}" for height in (min(heights), max(heights)))
+        return f"The robot's body reaches {' to '.join(ends)} m"
     mean = sum(heights) / len(heights)
-    if plan is None:
-        return f"The robot's body reaches {mean:.3f} m"
     error = 1e3 * (mean - plan.apex)
     side = "above" if error > 0 else "below"
     off = f", {abs(error):.0f} mm {side} the plan," if round(error) else " as planned"

@@ -42,11 +42,11 @@ def test_the_shares_add_up_to_the_whole_robot() -> None:
     still = robot.model_copy(update={"leg": robot.leg.model_copy(update={"rotor_inertia": 0.0})})
     model = build_pin_model(still)
     tree, rate, acc = np.random.default_rng(1).normal(size=(3, model.nv)) * 0.3
-    figures = robot_mechanism(robot).tolerances
+    figures = list(robot_mechanism(robot).tolerances)
     joints = read_joints(build_pin_model(robot))
     motion = (ca.SX(tree), ca.SX(rate), ca.SX(acc))
     forces = link_forces(joints, figures, motion, robot.gravity)
-    total = np.array(ca.evalf(sum(forces))).ravel()
+    total = np.array(ca.evalf(ca.sum2(forces))).ravel()
     assert total == pytest.approx(pin.rnea(model, model.createData(), tree, rate, acc), abs=1e-9)
 
 

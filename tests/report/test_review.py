@@ -307,6 +307,14 @@ def drive_log(path: Path) -> None:
     Trajectory(time, {"axis/q [m]": noisy, "axis/tau [N]": force}).write(path)
 
 
+def test_heights_of_different_motions_are_no_average() -> None:
+    events = [(name, Events(0.3, apex)) for name, apex in (("hop", 0.35), ("jump", 0.501))]
+    assert of_logs(events, None, None, None, WORDS).sentence == (
+        "The robot's body reaches 0.350 to 0.501 m."
+    )
+    assert "reaches 0.350 m." in of_logs(events[:1], None, None, None, WORDS).sentence
+
+
 def test_folders_are_taken_for_what_they_hold(jump: Path, tmp_path: Path) -> None:
     (tmp_path / "answer").mkdir()
     (tmp_path / "answer" / "answer.json").write_text(json.dumps(ANSWER))

@@ -1,14 +1,15 @@
-"""Nonlinear refit of one hypothesis: least squares with priors, within bounds, by steps that are
-taken only where the cost falls. Slopes along nuisance parameters are those of the null, but for
-those that are `curved`."""
+"""Nonlinear refit of one hypothesis: least squares with priors, within bounds, by Levenberg's and
+Marquardt's steps. Slopes along nuisance parameters are those of the null, but for those that are
+`curved`, so that only the few columns of an effect are new in a step."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
 
 from kemba.identify.infer.linear import is_shape
 from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
@@ -20,8 +21,9 @@ class RefitSettings:
     """The nonlinear refit of one hypothesis."""
 
     evaluations = 10  # largest number of evaluations
-    cost = 3e-6  # relative change of the cost at which a fit ends
-    change = 1e-4  # relative change of x at which a fit ends
+    cost = 3e-6  # relative change of the cost, as a step promises it, at which a fit ends
+    poor = 0.25  # share of what a step promises below which the next one is damped
+    damping, more = 1e-2, 10.0  # share of the diagonal that is added then, and its factor
     step = 0.03  # step of finite differences, in prior widths
     bound = 8.0  # largest distance of a nominal figure or a shape from its prior mean, in widths
     # the same of an effect that is there: a zero may be off by any amount, and what is found must
@@ -32,6 +34,9 @@ class RefitSettings:
     # a shape also starts at its default times and over this, if within two prior widths
     factor = 3.0
     absurd = 1e6  # residuals are clipped at so many sigmas: finite, beyond all data
+
+
+INSIDE = 1e-9  # distance from a bound, in widths: an effect that is as good as absent stays on
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,11 @@ class Frozen:
 
     names: tuple[str, ...]
     jacobian: Array
+
+    @cached_property
+    def gram(self) -> Array:
+        """Products (k, k) of the slopes with each other."""
+        return np.asarray(self.jacobian.T @ self.jacobian)
 
 
 def refit(
@@ -117,44 +127,54 @@ class _LeastSquares:
         self.nuisance = list(frozen.names)
         self.curved = [n for n in problem.curved if n in frozen.names]
         self.start = dict(start)
+        self.sigmas = np.array([problem.nuisance[name][1] for name in frozen.names])
         self.settings, self.slab = RefitSettings, SpikeSlabSettings.slab
-        self._last: tuple[Array, Array] | None = None  # x, and residuals there
 
     def run(self) -> Fit:
-        x0 = np.array([*self._nuisance_start(), *(self._in(k, self.start[k]) for k in self.own)])
+        settings = self.settings
         lower, upper = self._bounds()
-        x0 = np.clip(x0, lower + 1e-9, upper - 1e-9)
-        found = least_squares(
-            self._residual,
-            x0,
-            self._jacobian,
-            bounds=(lower, upper),
-            method="trf",
-            x_scale=1.0,
-            max_nfev=self.settings.evaluations,
-            ftol=self.settings.cost,
-            xtol=self.settings.change,
-        )
-        theta, columns = self._theta(found.x), self._columns(found.jac)
+        lower, upper = lower + INSIDE, upper - INSIDE
+        x = np.array([*self._nuisance_start(), *(self._in(k, self.start[k]) for k in self.own)])
+        x = np.clip(x, lower, upper)
+        r, damping = self._residual(x), 0.0
+        at, slopes = self._slopes(x, r)
+        gram, slope = self._normal_equations(x, r, at, slopes)
+        for _ in range(settings.evaluations - 1):
+            step = _best_step(gram, slope, damping, lower - x, upper - x)
+            expected = -float(slope @ step + 0.5 * step @ gram @ step)
+            if expected < settings.cost * _cost(x, r):
+                break
+            there = self._residual(x + step)
+            gain = _cost(x, r) - _cost(x + step, there)
+            if gain < settings.poor * expected:
+                damping = max(settings.damping, settings.more * damping)
+            else:
+                damping /= settings.more
+            if gain > 0.0:
+                x, r = x + step, there
+                at, slopes = self._slopes(x, r)
+                gram, slope = self._normal_equations(x, r, at, slopes)
+        theta, columns = self._theta(x), self._columns(at, slopes)
         if self.problem.bends:
             columns = self._anew(theta) | columns
-        return Fit(theta, float(found.cost), columns)
+        return Fit(theta, _cost(x, r), columns)
 
     def _anew(self, theta: Mapping[str, float]) -> dict[str, Array]:
         """Slopes at theta along everything that no part of the hypothesis is."""
         names = [*self.problem.nuisance, *(c.key for c in self.problem.candidates.values())]
         return dict(zip(names, self.problem.jacobian(theta, names).T, strict=True))
 
-    def _columns(self, jacobian: Array) -> dict[str, Array]:
+    def _columns(self, at: Array, slopes: Array) -> dict[str, Array]:
         """Slopes of the residual per unit of each own parameter, from those per prior width."""
-        rows, n = len(self.frozen.jacobian), len(self.nuisance)
-        columns = {
-            name: jacobian[:rows, self.nuisance.index(name)] / self.problem.nuisance[name][1]
-            for name in self.curved
-        }
-        for i, (key, p) in enumerate(self.own.items(), start=n):
-            unit = p.size if is_shape(self.problem, key) else self.slab * p.size
-            columns[key] = jacobian[:rows, i] / unit
+        columns, own = {}, list(self.own.items())
+        for i, column in zip(at.tolist(), slopes.T, strict=True):
+            if i < len(self.nuisance):
+                name = self.nuisance[i]
+                columns[name] = column / self.problem.nuisance[name][1]
+            else:
+                key, p = own[i - len(self.nuisance)]
+                unit = p.size if is_shape(self.problem, key) else self.slab * p.size
+                columns[key] = column / unit
         return columns
 
     def _nuisance_start(self) -> Iterable[float]:
@@ -206,33 +226,51 @@ class _LeastSquares:
         return theta
 
     def _residual(self, x: Array) -> Array:
-        """Residuals (n,), then the distances (k,) from the prior means in widths."""
-        # slopes are asked for where the residual was
-        if self._last is None or not np.array_equal(x, self._last[0]):
-            r = bounded(self.problem.residual(self._theta(x)), self.settings.absurd)
-            self._last = x.copy(), np.concatenate([r, x])
-        return self._last[1]
+        return bounded(self.problem.residual(self._theta(x)), self.settings.absurd)
 
-    def _jacobian(self, x: Array) -> Array:
-        base = self._residual(x)
-        n = len(self.nuisance)
-        sigmas = np.array([self.problem.nuisance[name][1] for name in self.nuisance])
-        jacobian = np.zeros((len(base), len(x)))
-        rows = len(base) - len(x)
-        slopes = self.frozen.jacobian
-        if self.curved:
-            slopes = slopes.copy()
-            at = [self.nuisance.index(name) for name in self.curved]
-            slopes[:, at] = self.problem.jacobian(self._theta(x), self.curved)
-        jacobian[:rows, :n] = slopes * sigmas
-        jacobian[rows:] = np.eye(len(x))
+    def _slopes(self, x: Array, r: Array) -> tuple[Array, Array]:
+        """Which of x (k,) have slopes of their own at x, where the residual is r (n,), and these
+        (n, c): the figures that are curved, and the effects' parameters."""
+        n, settings = len(self.nuisance), self.settings
+        curved = [self.nuisance.index(name) for name in self.curved]
+        at = np.array([*curved, *range(n, len(x))], dtype=int)
+        parts = []
+        if curved:
+            slopes = self.problem.jacobian(self._theta(x), self.curved)
+            parts.append(slopes * self.sigmas[curved])
         if self.own:
             # inwards at an upper bound: beyond it nothing changes
-            upper, step = self._bounds()[1][n:], self.settings.step
-            steps = np.where(x[n:] + step > upper, -step, step)
+            upper = self._bounds()[1][n:]
+            steps = np.where(x[n:] + settings.step > upper, -settings.step, settings.step)
             moved = x + np.eye(len(x))[n:] * steps[:, None]
-            there = bounded(
-                self.problem.residuals([self._theta(z) for z in moved]), self.settings.absurd
-            )
-            jacobian[:rows, n:] = (there - base[:rows, None]) / steps
-        return jacobian
+            there = self.problem.residuals([self._theta(z) for z in moved])
+            parts.append((bounded(there, settings.absurd) - r[:, None]) / steps)
+        return at, np.hstack(parts) if parts else np.empty((len(r), 0))
+
+    def _normal_equations(
+        self, x: Array, r: Array, at: Array, slopes: Array
+    ) -> tuple[Array, Array]:
+        """Products (k, k) of all slopes, priors included, and the cost's gradient (k,)."""
+        n, sigmas = len(self.nuisance), self.sigmas
+        gram, slope = np.eye(len(x)), x.copy()
+        gram[:n, :n] += self.frozen.gram * np.outer(sigmas, sigmas)
+        slope[:n] += (r @ self.frozen.jacobian) * sigmas
+        mixed = np.zeros((len(x), len(at)))
+        mixed[:n] = (slopes.T @ self.frozen.jacobian).T * sigmas[:, None]
+        mixed[at] = slopes.T @ slopes
+        gram[:, at] = mixed
+        gram[at] = mixed.T
+        gram[at, at] += 1.0
+        slope[at] = x[at] + r @ slopes
+        return gram, slope
+
+
+def _cost(x: Array, r: Array) -> float:
+    return 0.5 * float(r @ r + x @ x)
+
+
+def _best_step(gram: Array, slope: Array, damping: float, low: Array, high: Array) -> Array:
+    """The step (k,) between `low` and `high` by which the quadratic cost falls most."""
+    root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
+    found = lsq_linear(root.T, -np.linalg.solve(root, slope), (low, high))
+    return np.asarray(found.x)

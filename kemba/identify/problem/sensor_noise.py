@@ -133,14 +133,16 @@ def weighted(columns: Sequence[Array], measured: Array, counts: Array) -> tuple[
     return a, (measured * weight).ravel()
 
 
-def lag_noise(memory: float, h: Array, draws: int, rng: np.random.Generator) -> Array:
-    """(n, L, draws): a first-order lag of white noise, of unit sigma."""
-    out = rng.standard_normal((*h.shape, draws))
-    if memory:
-        keep = np.exp(-h / memory)[..., None]
-        drive = np.sqrt(1.0 - keep**2)
-        for k in range(1, len(out)):
-            out[k] = keep[k - 1] * out[k - 1] + drive[k - 1] * out[k]
+def lag_noise(memories: Sequence[float], h: Array, draws: int, rng: np.random.Generator) -> Array:
+    """(n, L, memories, draws): first-order lags of the same white noise, of unit sigma; `h` (n, L)
+    and `memories` [s], of which 0 is white."""
+    white = rng.standard_normal((*h.shape, 1, draws))
+    memory = np.maximum(memories, 1e-9)  # [s]; below any step
+    keep = np.exp(-h[..., None] / memory)[..., None]
+    out = np.repeat(white, len(memory), axis=2)
+    out[1:] *= np.sqrt(1.0 - keep[:-1] ** 2)
+    for k in range(1, len(out)):
+        out[k] += keep[k - 1] * out[k - 1]
     return np.asarray(out)
 
 

@@ -131,7 +131,8 @@ class Forces:
     def states(self, p: Array, delays: Array, among: Index | None) -> tuple[Array, Array]:
         """Effect states (N, ns) and inputs (N, nu) at the samples; `among`: states that are asked
         for (None: all)."""
-        key = delays.tobytes() + p[self.physics.moves].tobytes() + bytes([among is None])
+        wanted = b"" if among is None else among.tobytes()
+        key = delays.tobytes() + p[self.physics.moves].tobytes() + wanted
         if key not in self._states:
             given = self._inputs.get(delays.tobytes())
             if given is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -56,8 +57,13 @@ class LinearisedMotion:
     def defect(self, force: Array) -> Array:
         """Acceleration (n, L, k) that the model adds to the reference's, with a force (n, L, k)
         that the motion needs beyond model and contact."""
+        return self._live_shift + self.response(force)
+
+    @cached_property
+    def _live_shift(self) -> Array:
+        """The shift (n, L, k) in nodes that are part of a run."""
         live = np.any(self.inverse != 0.0, axis=(2, 3))[..., None]
-        return np.where(live, self.shift, 0.0) + self.response(force)
+        return np.where(live, self.shift, 0.0)
 
     def system_with(self, density: Array, h: Array) -> System:
         """The filter's system with other densities (n, L, c) of unknown force; `h` (n, L) [s]."""

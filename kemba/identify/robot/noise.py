@@ -143,7 +143,7 @@ def learnt_noise(
     memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
     m = system.H.shape[2]
     for channel in range(channels):
-        y = np.concatenate([_channel_noise(t, channel, sigma, h, m) for t in memories], axis=-1)
+        y = _channel_noise(memories, channel, sigma, h, m)
         seen = innovations(system, gain, y, None)
         parts = np.split(seen, len(memories), axis=-1)
         columns += [covariances(part, errors, counts) for part in parts]
@@ -155,20 +155,21 @@ def learnt_noise(
     return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
 
 
-def _channel_noise(memory: float, channel: int, sigma: Array, h: Array, m: int) -> Array:
-    """Noise (n, L, m, draws) of one channel, of one stated sigma; `memory` [s]: 0 is white."""
-    draws = ColourSettings.draws
-    rng = np.random.default_rng(17 + channel)
-    y = np.zeros((*h.shape, m, draws))
-    y[:, :, channel] = sigma[:, channel, None] * lag_noise(memory, h, draws, rng)
+def _channel_noise(
+    memories: Sequence[float], channel: int, sigma: Array, h: Array, m: int
+) -> Array:
+    """Noise (n, L, m, memories x draws) of one channel, of one stated sigma; `memories` [s]: 0 is
+    white."""
+    draws = lag_noise(memories, h, ColourSettings.draws, np.random.default_rng(17 + channel))
+    y = np.zeros((*h.shape, m, len(memories) * ColourSettings.draws))
+    y[:, :, channel] = sigma[:, channel, None] * draws.reshape(*h.shape, -1)
     return y
 
 
 def _force_noise(memory: float, push: Array, h: Array) -> Array:
     """Accelerations (n, L, k, draws) of one force of unit sigma."""
-    draws = ColourSettings.draws
-    force = lag_noise(memory, h, draws, np.random.default_rng(5))
-    return np.asarray(push[..., None] * force[:, :, None])
+    force = lag_noise([memory], h, ColourSettings.draws, np.random.default_rng(5))
+    return np.asarray(push[..., None] * force)
 
 
 class SensorNoiseSettings:

@@ -146,10 +146,11 @@ class Physics:
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
         states = list(self.model.states.values())
         self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
-        self._follows = ca.jacobian_sparsity(rate, node.s)
+        self._rate = rate
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
         self._maps: dict[str, SampleMap] = {}
+        self._needed: dict[tuple[int, ...], Index] = {}
         self._knees: dict[tuple[int, bytes], tuple[Array, Array]] = {}
 
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
@@ -219,30 +220,30 @@ class Physics:
             bends[row // rows, column] = True
         return ~(np.diag(bends) | self.moves), bends
 
-    def states_at(self, p: Array) -> Index | None:
-        """Effect states that forces at p (k,) depend on; None: all of them."""
-        switches, without = self._without
-        return None if np.any(p[switches] != 0.0) else without
+    def states_at(self, p: Array) -> Index:
+        """Effect states that forces at p (k,) depend on."""
+        key = tuple(i for i in self._switches if p[i] == 0.0)
+        if key not in self._needed:
+            zero = self.p[list(key)]
+            bare = ca.substitute([self._force, self._rate], [zero], [ca.SX.zeros(zero.shape)])
+            force, follows = (ca.jacobian_sparsity(x, self.node.s).get_triplet() for x in bare)
+            found, pairs = set(force[1]), list(zip(*follows, strict=True))
+            while more := {of for state, of in pairs if state in found} - found:
+                found |= more
+            self._needed[key] = np.array(sorted(found), dtype=int)
+        return self._needed[key]
 
     @cached_property
-    def _without(self) -> tuple[Index, Index]:
-        """Parameters that switch effects with states on, and the states that matter while all of
-        them are zero."""
-        named = [
+    def _switches(self) -> list[int]:
+        """Parameters that switch effects with states on."""
+        named = {
             f"{effect.name}.{field}"
             for effect in self.base.effects
             if effect.states()
             for field, off in effect.off.items()
             if off == 0.0
-        ]
-        switches = np.array([i for i, n in enumerate(self.names) if n in named], dtype=int)
-        r, zero = self._force, self.p[switches.tolist()]
-        bare = ca.substitute(r, zero, ca.SX.zeros(zero.shape))
-        found = set(ca.jacobian_sparsity(bare, self.node.s).get_triplet()[1])
-        pairs = list(zip(*self._follows.get_triplet(), strict=True))
-        while more := {of for state, of in pairs if state in found} - found:
-            found |= more
-        return switches, np.array(sorted(found), dtype=int)
+        }
+        return [i for i, name in enumerate(self.names) if name in named]
 
     @property
     def _force(self) -> ca.SX:

@@ -66,6 +66,8 @@ class LinearisedState:
     forces: Forces
     noise: Noise = ()
     linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
+    # what was `seen` with the lengths asked for last: a column of slopes seldom changes them
+    _last_seen: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     @cached_property
     def _at_base(self) -> Array:
@@ -91,17 +93,25 @@ class LinearisedState:
         own = self.physics.lengths
         if np.array_equal(p[own], at[own]):
             return self.motion.y, self.motion.places
-        nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
-        y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
-        return y, np.concatenate([feet, y[..., y.shape[2] - len(self.physics.legs) :]], axis=2)
+        key = p[own].tobytes()
+        if key not in self._last_seen:
+            nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
+            y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
+            stops = y[..., y.shape[2] - len(self.physics.legs) :]
+            self._last_seen.clear()
+            self._last_seen[key] = y, np.concatenate([feet, stops], axis=2)
+        return self._last_seen[key]
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
         force = self.forces.at(*_values_at(self.physics, theta))
-        for name, (column, nominal) in self.linear.items():
-            if theta.get(name, nominal) != nominal:
-                force += (theta[name] - nominal) * column
-        return self.motion.defect(force)
+        beside = [theta.get(name, nominal) - nominal for name, (_, nominal) in self.linear.items()]
+        return self.motion.defect(force + self._columns @ beside if any(beside) else force)
+
+    @cached_property
+    def _columns(self) -> Array:
+        """Forces (n, L, k, c) per unit of the parameters that stand beside the model."""
+        return np.stack([column for column, _ in self.linear.values()], axis=-1)
 
     def slopes(self, theta: Theta, names: Sequence[str]) -> Iterator[Array]:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""

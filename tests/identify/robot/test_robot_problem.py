@@ -132,3 +132,23 @@ def test_denser_rows_are_averaged_and_sparse_ones_bridged() -> None:
         problem = robot_problem([again], load_model("planning"))
         assert 0.7e-3 <= np.median(problem.batch.h[problem.batch.valid]) <= 1.6e-3
         assert np.isfinite(problem.residual({})).all()
+
+
+def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> None:
+    """No effect with a memory, and each by itself."""
+    physics, forces = clean.physics, clean.state.forces
+    delays = np.zeros((2 * len(physics.legs), 2))
+    sizes = {c.key: c.lead.off + c.lead.size for c in clean.candidates.values()}
+    switches = [physics.names[i] for i in physics._switches]
+    assert len(switches) >= 2
+    for on in ([], *([name] for name in switches)):
+        p = physics.nominal.copy()
+        for name in on:
+            p[physics.names.index(name)] = sizes[name]
+        few = physics.states_at(p)
+        few_force, whole = (
+            physics.call("residual", *clean.state.motion.middle, *states, p=p)[0]
+            for states in (forces.states(p, delays, few), forces.states(p, delays, None))
+        )
+        assert few_force == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
+    assert len(physics.states_at(physics.nominal)) < physics.states.count
