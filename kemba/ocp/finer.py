@@ -6,6 +6,7 @@ program near the solution, so that only a few iterations are made on many nodes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
 
@@ -37,32 +38,36 @@ class Sought(Settings):
         return max(self.nodes, ceil(duration / self.step))
 
 
-def found_and_refined(planner: Planner, refused: bool) -> Plan:
-    """A plan from the guess, refined where the task asks for it; without grip, which comes
-    last."""
+Judge = Callable[[Plan], bool]
+
+
+def found_and_refined(planner: Planner, refused: bool, worth: Judge) -> Plan | None:
+    """A plan from the guess, refined where the task asks for it; without grip, which comes last.
+    None where it is not `worth` refining."""
     if planner.task.refine == "radau" and planner.start is None and not refused:
-        found = _from_fewer(planner)
-        if found is not None:
-            return found
+        fewer = Sought.current().most(planner.task.duration)
+        if planner.task.nodes > fewer:
+            coarse = replace(planner, task=planner.task.model_copy(update={"nodes": fewer}))
+            sought = searched(coarse, False)
+            if sought.status is Status.SOLVED and not worth(sought):
+                return None
+            found = _from_fewer(planner, refined(coarse, sought))
+            if found is not None:
+                return found
     found = searched(planner, refused)
     if found.status is Status.SOLVED and planner.task.refine == "radau":
-        found = refined(planner, found)
+        return refined(planner, found) if worth(found) else None
     return found
 
 
-def _from_fewer(planner: Planner) -> Plan | None:
-    """The plan on the task's nodes from one on fewer; None where they are few, or where there is
-    none or it cannot be solved on all of them. Where time is up before that, what there is."""
+def _from_fewer(planner: Planner, found: Plan) -> Plan | None:
+    """The plan on the task's nodes from the one `found` on fewer; None where that is not refined or
+    cannot be solved on all of them. Where time is up before that, what there is."""
     task = planner.task
-    fewer = Sought.current().most(task.duration)
-    if task.nodes <= fewer:
-        return None
-    coarse = replace(planner, task=task.model_copy(update={"nodes": fewer}))
-    found = refined(coarse, searched(coarse, False))
     if not found.refined:
         return None if planner.session.control.ended() is None else found
     plain = {"grip": 1.0}  # as the coarser plan was made
-    name = f"the plan on {fewer} nodes"
+    name = f"the plan on {found.task.nodes} nodes"
     origin = Origin(
         found.trajectory, found.model, found.requirements, name, once=True, stages=found.stages
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.continued import continued, from_scratch, with_grip
-from kemba.ocp.finer import found_and_refined
+from kemba.ocp.finer import Judge, found_and_refined
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -26,6 +26,7 @@ from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of
+from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.sequence import as_one, motions
 from kemba.ocp.task.requirement import Requirement
@@ -97,9 +98,15 @@ class Planning:
         """Why there is no plan to be sought."""
         return refusal(self.diagnostics)
 
-    def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
+    def plans(
+        self, origin: Origin | None = None, promising: Judge = lambda found: True
+    ) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
-        the other as long as they give any."""
+        the other as long as they give any.
+
+        Of further guesses only plans that are `promising` before they are refined are refined and
+        given, and none whose contacts and valves come in the order of an earlier one.
+        """
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -110,17 +117,24 @@ class Planning:
                 failed = LEFT
             failed = failed if origin.given else ""
         task, planner = self.planner.task, self.planner
-        for number, guess in enumerate(guesses(task, planner.model)):
+        orders: list[Order | None] = []
+        for number, guess in enumerate(guesses(planner)):
+            if number and self.over:
+                return
             if number:
                 planner.session.tell("another guess")
-            found = self._from_guess(guess if planner.start is None else replace(guess, pulse=0.0))
+            worth = _Worth(promising, orders)
+            found = self._from_guess(guess, worth)
+            orders = [*orders, *worth.own]
+            if found is None:
+                continue
             start = f"guess {number + 1}" if number else found.start
             for each, how in ((found, ""), (found.plain, ", without further pulses")):
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
             only = planner.start is not None or task.refine != "radau"
-            if self.over or only or not found.status.plan:
+            if only or not (number or found.status.plan):
                 return
 
     def continued(self, origin: Origin) -> tuple[Plan | None, str]:
@@ -129,13 +143,18 @@ class Planning:
             found, why = continued(self.planner, origin)
         return found and self._timed(found), why
 
-    def _from_guess(self, guess: StartGuess) -> Plan:
+    def _from_guess(self, guess: StartGuess, worth: Judge) -> Plan | None:
+        """The plan from a guess; None where it is not worth refining."""
         refused = self.refused
         task = self.planner.task
         begins = task.model_copy(update=guess.update)
-        planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None)
+        there = replace(self.planner, pulse=guess.pulse, turning=guess.turning)
+        planner = replace(there, task=begins, outcome=None)
         with self.clock.running():
-            found = replace(found_and_refined(planner, refused is not None), task=task)
+            made = found_and_refined(planner, refused is not None, worth)
+            if made is None:
+                return None
+            found = replace(made, task=task)
             if found.status is Status.SOLVED and task.grip < 1.0:
                 found = replace(with_grip(self.planner, found), plain=None)
         if not found.status.plan and found.status is not Status.INTERRUPTED:
@@ -159,6 +178,23 @@ class Planning:
             solve_cpu_s=clock.cpu - session.building.cpu,
             build_s=session.building.wall,
         )
+
+
+@dataclass
+class _Worth:
+    """Whether a plan is worth refining: the first one is, others where they are promising and their
+    order is not among those `before`. `own`: the orders of those that were judged."""
+
+    promising: Judge
+    before: Sequence[Order | None]
+    own: list[Order | None] = field(default_factory=list)
+
+    def __call__(self, found: Plan) -> bool:
+        known = found.model, found.task, found.requirements, found.trajectory
+        order = order_of(*known)
+        self.own.append(order)
+        new = order is None or order not in self.before
+        return not self.before or (new and self.promising(found))
 
 
 def plan(
@@ -225,17 +261,20 @@ def program_size(task: Task, document: Document, model: str | Path | None = None
 
 # noise of a further guess, of every scale: enough for another plan, too little for a strange one
 NOISE = 0.05
-OTHERS = 2  # further guesses at most: each costs as much as the first
+# of the squared pitch rate, in rad2/s; with a tenth legs still push one after the other
+TURNING = 3.0
+OTHERS = 4  # guesses at most: each costs as much as the first
 
 
 @dataclass(frozen=True)
 class StartGuess:
-    """A start guess with `noise` drawn by `seed`, and the shortest `pulse` [s] of a valve that is
-    sought from it."""
+    """A start guess with `noise` drawn by `seed`, the shortest `pulse` [s] of a valve that is
+    sought from it, and what a `turning` body costs meanwhile [1/rad2/s of the task's cost]."""
 
     pulse: float
     noise: float
     seed: int
+    turning: float = 0.0
 
     @property
     def update(self) -> dict[str, Any]:
@@ -243,16 +282,25 @@ class StartGuess:
         return {"guess_noise": self.noise, "seed": self.seed}
 
 
-def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
+def guesses(planner: Planner) -> Sequence[StartGuess]:
     """The guesses of a task.
 
     A relaxed valve is open in part; rounded on a grid it opens and closes from node to node. Pulses
     that are shorter than the filling of a chamber move the leg little, and plans with many of them
     have no neighbours without. So they are left out first, and taken only where that gives no plan.
+
+    Legs that push one after the other turn the body to and fro, and depend on more of the air: on
+    one supply the valve that opens first starves the next, and what a leg lacks turns the robot.
+    Where turning costs, they push together.
     """
-    fill = max(model.mechanism.need_cylinder().fill)
-    longer = max(fill, task.min_dwell)
-    found = [StartGuess(pulse, task.guess_noise, task.seed) for pulse in (longer, task.min_dwell)]
+    task = planner.task
+    if planner.start is not None:
+        return [StartGuess(0.0, task.guess_noise, task.seed)]
+    longer = max(*planner.model.mechanism.need_cylinder().fill, task.min_dwell)
+    first = StartGuess(longer, task.guess_noise, task.seed)
+    found = [first] if planner.symmetric else [first, replace(first, turning=TURNING)]
+    found.append(replace(first, pulse=task.min_dwell))
     noise = max(task.guess_noise, NOISE)
-    found += [StartGuess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
+    others = OTHERS - len(found)
+    found += [replace(first, noise=noise, seed=task.seed + k) for k in range(1, others + 1)]
     return list(dict.fromkeys(found))

@@ -22,6 +22,7 @@ from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent
 from kemba.ocp.starts import plan_best
+from kemba.solve.judged import promising
 from kemba.solve.listener import Listener
 from kemba.solve.repairs import repaired
 from kemba.solve.trial import Begun, Trial, TrialOrder, executed
@@ -145,7 +146,8 @@ def _candidates(
         from kemba.solve.memory import recalled
 
         origin = recalled(task, planning.planner.model, listener.tell)
-    for found in planning.plans(origin):
+    judges = (promising,) if approach.replay else ()
+    for found in planning.plans(origin, *judges):
         yield PlanCandidate(found)
 
 
