@@ -86,9 +86,10 @@ class Planner:
         return mirrored_requirements(self.model, self.requirements)
 
     @property
-    def symmetric(self) -> bool:
-        """Whether the whole task is the same for both legs, so that half a robot plans it."""
-        return self.half is not None and self.alike == self.requirements
+    def unequal(self) -> bool:
+        """Whether legs that are equal and stand together are asked for different things: half a
+        robot does not plan it all, but shows roughly what to do."""
+        return self.half is not None and self.together and self.alike != self.requirements
 
     @property
     def together(self) -> bool:
@@ -99,8 +100,7 @@ class Planner:
 
     def reductions(self) -> Iterator[Reduction]:
         """Half robot first where model and task are mirror images of themselves."""
-        if self.symmetric:
-            assert self.half is not None
+        if self.half is not None and self.alike == self.requirements:
             yield self.half
         yield whole(self.model.node)
 
@@ -139,7 +139,8 @@ class Planner:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
         t = schedule.transcription
-        if self.half is not None and self.together and self.alike != self.requirements:
+        if self.unequal:
+            assert self.half is not None
             half = self.schedule(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))
             if point.solved:

@@ -261,7 +261,8 @@ def program_size(task: Task, document: Document, model: str | Path | None = None
 
 # noise of a further guess, of every scale: enough for another plan, too little for a strange one
 NOISE = 0.05
-# of the squared pitch rate, in rad2/s; with a tenth legs still push one after the other
+# N2.m2, of the squared pitch rate over time: in six of six forward jumps legs then pushed together,
+# or nearly; other weights were not tried
 TURNING = 3.0
 OTHERS = 4  # guesses at most: each costs as much as the first
 
@@ -269,7 +270,7 @@ OTHERS = 4  # guesses at most: each costs as much as the first
 @dataclass(frozen=True)
 class StartGuess:
     """A start guess with `noise` drawn by `seed`, the shortest `pulse` [s] of a valve that is
-    sought from it, and what a `turning` body costs meanwhile [1/rad2/s of the task's cost]."""
+    sought from it, and the weight of the squared pitch rate meanwhile, `turning` [N2.m2]."""
 
     pulse: float
     noise: float
@@ -298,9 +299,8 @@ def guesses(planner: Planner) -> Sequence[StartGuess]:
         return [StartGuess(0.0, task.guess_noise, task.seed)]
     longer = max(*planner.model.mechanism.need_cylinder().fill, task.min_dwell)
     first = StartGuess(longer, task.guess_noise, task.seed)
-    found = [first] if planner.symmetric else [first, replace(first, turning=TURNING)]
-    found.append(replace(first, pulse=task.min_dwell))
+    second = replace(first, turning=TURNING) if planner.unequal else first
+    found = list(dict.fromkeys((first, second, replace(first, pulse=task.min_dwell))))
     noise = max(task.guess_noise, NOISE)
-    others = OTHERS - len(found)
-    found += [replace(first, noise=noise, seed=task.seed + k) for k in range(1, others + 1)]
-    return list(dict.fromkeys(found))
+    others = range(1, OTHERS - len(found) + 1)
+    return [*found, *(replace(second, noise=noise, seed=task.seed + k) for k in others)]
