@@ -41,22 +41,22 @@ class Sought(Settings):
 Judge = Callable[[Plan], bool]
 
 
-def found_and_refined(planner: Planner, refused: bool, worth: Judge) -> Plan | None:
+def found_and_refined(planner: Planner, refused: bool, new: Judge) -> Plan | None:
     """A plan from the guess, refined where the task asks for it; without grip, which comes last.
-    None where it is not `worth` refining."""
+    None where it is not `new`: it is not refined then."""
     if planner.task.refine == "radau" and planner.start is None and not refused:
         fewer = Sought.current().most(planner.task.duration)
         if planner.task.nodes > fewer:
             coarse = replace(planner, task=planner.task.model_copy(update={"nodes": fewer}))
             sought = searched(coarse, False)
-            if sought.status is Status.SOLVED and not worth(sought):
+            if sought.status is Status.SOLVED and not new(sought):
                 return None
             found = _from_fewer(planner, refined(coarse, sought))
             if found is not None:
                 return found
     found = searched(planner, refused)
     if found.status is Status.SOLVED and planner.task.refine == "radau":
-        return refined(planner, found) if worth(found) else None
+        return refined(planner, found) if new(found) else None
     return found
 
 

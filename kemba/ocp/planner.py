@@ -26,12 +26,10 @@ from kemba.ocp.relaxation.schedule import (
 from kemba.ocp.relaxation.session import Schedule, Session, Stopped
 from kemba.ocp.relaxation.settings import Grids
 from kemba.ocp.task.requirement import Requirement
-from kemba.ocp.task.task import CostTerm, Task
+from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_requirements, whole
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
-
-TURNING = "body/pitch_rate^2"
 
 
 def grids(nodes: int) -> list[int]:
@@ -52,19 +50,14 @@ class Planner:
     session: Session = field(default_factory=Session)
     start: Trajectory | None = None
     pulse: float = 0.0  # [s], of valves that are sought; the task's dwell where that is more
-    turning: float = 0.0  # weight of the body's squared pitch rate while a plan is sought
     outcome: Outcome | None = None  # of the elastic solve after a failure
 
     def schedule(self, nodes: int, reduction: Reduction) -> Schedule:
         """A fresh program on a grid of `nodes`; of half a robot, for what is asked of both legs
         alike."""
         requirements = self.alike if reduction.symmetric else self.requirements
-        task = self.task
-        if self.turning:
-            term = CostTerm(expression=TURNING, weight=self.turning)
-            task = task.model_copy(update={"cost": {**task.cost, "turning while sought": term}})
         with self.session.building.running():
-            program = Transcription(self.model, task, requirements, reduction, nodes)
+            program = Transcription(self.model, self.task, requirements, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         name = "half" if reduction.symmetric else "whole"
         where = f" ({name} robot, {nodes} nodes)"
@@ -84,12 +77,6 @@ class Planner:
     def alike(self) -> list[Requirement]:
         """The requirements whose mirror images are required as well."""
         return mirrored_requirements(self.model, self.requirements)
-
-    @property
-    def unequal(self) -> bool:
-        """Whether legs that are equal and stand together are asked for different things: half a
-        robot does not plan it all, but shows roughly what to do."""
-        return self.half is not None and self.together and self.alike != self.requirements
 
     @property
     def together(self) -> bool:
@@ -139,8 +126,7 @@ class Planner:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
         t = schedule.transcription
-        if self.unequal:
-            assert self.half is not None
+        if self.half is not None and self.together and self.alike != self.requirements:
             half = self.schedule(t.nodes, self.half)
             point = find(half, self.guess(half.transcription))
             if point.solved:
@@ -204,4 +190,4 @@ class Planner:
 def searched(planner: Planner, refused: bool) -> Plan:
     """What the strategies find, judged; the start guess for a task that a check refused."""
     transcription, point = planner.refuse() if refused else planner.run()
-    return replace(judge(planner.requirements, transcription, point), task=planner.task)
+    return judge(planner.requirements, transcription, point)

@@ -98,15 +98,10 @@ class Planning:
         """Why there is no plan to be sought."""
         return refusal(self.diagnostics)
 
-    def plans(
-        self, origin: Origin | None = None, promising: Judge = lambda found: True
-    ) -> Iterator[Plan]:
+    def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
-        the other as long as they give any.
-
-        Of further guesses only plans that are `promising` before they are refined are refined and
-        given, and none whose contacts and valves come in the order of an earlier one.
-        """
+        the other as long as they give any; none whose contacts and valves come in the order of an
+        earlier one, as the same program would refine it."""
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -116,25 +111,24 @@ class Planning:
                     return
                 failed = LEFT
             failed = failed if origin.given else ""
-        task, planner = self.planner.task, self.planner
-        orders: list[Order | None] = []
-        for number, guess in enumerate(guesses(planner)):
+        task, planner, orders = self.planner.task, self.planner, _Orders()
+        for number, guess in enumerate(guesses(task, planner.model)):
             if number and self.over:
                 return
             if number:
                 planner.session.tell("another guess")
-            worth = _Worth(promising, orders)
-            found = self._from_guess(guess, worth)
-            orders = [*orders, *worth.own]
+            own = guess if planner.start is None else replace(guess, pulse=0.0)
+            found = self._from_guess(own, orders.new)
             if found is None:
                 continue
+            orders.keep(found)
             start = f"guess {number + 1}" if number else found.start
             for each, how in ((found, ""), (found.plain, ", without further pulses")):
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
             only = planner.start is not None or task.refine != "radau"
-            if only or not (number or found.status.plan):
+            if only or not found.status.plan:
                 return
 
     def continued(self, origin: Origin) -> tuple[Plan | None, str]:
@@ -143,15 +137,14 @@ class Planning:
             found, why = continued(self.planner, origin)
         return found and self._timed(found), why
 
-    def _from_guess(self, guess: StartGuess, worth: Judge) -> Plan | None:
-        """The plan from a guess; None where it is not worth refining."""
+    def _from_guess(self, guess: StartGuess, new: Judge) -> Plan | None:
+        """The plan from a guess; None where it is not `new`."""
         refused = self.refused
         task = self.planner.task
         begins = task.model_copy(update=guess.update)
-        there = replace(self.planner, pulse=guess.pulse, turning=guess.turning)
-        planner = replace(there, task=begins, outcome=None)
+        planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None)
         with self.clock.running():
-            made = found_and_refined(planner, refused is not None, worth)
+            made = found_and_refined(planner, refused is not None, new)
             if made is None:
                 return None
             found = replace(made, task=task)
@@ -181,20 +174,21 @@ class Planning:
 
 
 @dataclass
-class _Worth:
-    """Whether a plan is worth refining: the first one is, others where they are promising and their
-    order is not among those `before`. `own`: the orders of those that were judged."""
+class _Orders:
+    """In which orders contacts and valves of refined plans come."""
 
-    promising: Judge
-    before: Sequence[Order | None]
-    own: list[Order | None] = field(default_factory=list)
+    known: list[Order] = field(default_factory=list)
+    last: Order | None = None
 
-    def __call__(self, found: Plan) -> bool:
-        known = found.model, found.task, found.requirements, found.trajectory
-        order = order_of(*known)
-        self.own.append(order)
-        new = order is None or order not in self.before
-        return not self.before or (new and self.promising(found))
+    def new(self, found: Plan) -> bool:
+        """Whether a plan that is not refined yet has another order than the refined ones."""
+        self.last = order_of(found.model, found.task, found.requirements, found.trajectory)
+        return self.last not in self.known
+
+    def keep(self, found: Plan) -> None:
+        """The last order is known if its plan was refined."""
+        if found.refined and self.last is not None:
+            self.known.append(self.last)
 
 
 def plan(
@@ -261,21 +255,17 @@ def program_size(task: Task, document: Document, model: str | Path | None = None
 
 # noise of a further guess, of every scale: enough for another plan, too little for a strange one
 NOISE = 0.05
-# N2.m2, of the squared pitch rate over time: in six of six forward jumps legs then pushed together,
-# or nearly; other weights were not tried
-TURNING = 3.0
-OTHERS = 4  # guesses at most: each costs as much as the first
+OTHERS = 2  # further guesses at most: each costs as much as the first
 
 
 @dataclass(frozen=True)
 class StartGuess:
-    """A start guess with `noise` drawn by `seed`, the shortest `pulse` [s] of a valve that is
-    sought from it, and the weight of the squared pitch rate meanwhile, `turning` [N2.m2]."""
+    """A start guess with `noise` drawn by `seed`, and the shortest `pulse` [s] of a valve that is
+    sought from it."""
 
     pulse: float
     noise: float
     seed: int
-    turning: float = 0.0
 
     @property
     def update(self) -> dict[str, Any]:
@@ -283,24 +273,16 @@ class StartGuess:
         return {"guess_noise": self.noise, "seed": self.seed}
 
 
-def guesses(planner: Planner) -> Sequence[StartGuess]:
+def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
     """The guesses of a task.
 
     A relaxed valve is open in part; rounded on a grid it opens and closes from node to node. Pulses
     that are shorter than the filling of a chamber move the leg little, and plans with many of them
     have no neighbours without. So they are left out first, and taken only where that gives no plan.
-
-    Legs that push one after the other turn the body to and fro, and depend on more of the air: on
-    one supply the valve that opens first starves the next, and what a leg lacks turns the robot.
-    Where turning costs, they push together.
     """
-    task = planner.task
-    if planner.start is not None:
-        return [StartGuess(0.0, task.guess_noise, task.seed)]
-    longer = max(*planner.model.mechanism.need_cylinder().fill, task.min_dwell)
-    first = StartGuess(longer, task.guess_noise, task.seed)
-    second = replace(first, turning=TURNING) if planner.unequal else first
-    found = list(dict.fromkeys((first, second, replace(first, pulse=task.min_dwell))))
+    fill = max(model.mechanism.need_cylinder().fill)
+    longer = max(fill, task.min_dwell)
+    found = [StartGuess(pulse, task.guess_noise, task.seed) for pulse in (longer, task.min_dwell)]
     noise = max(task.guess_noise, NOISE)
-    others = range(1, OTHERS - len(found) + 1)
-    return [*found, *(replace(second, noise=noise, seed=task.seed + k) for k in others)]
+    found += [StartGuess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
+    return list(dict.fromkeys(found))

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.asked import MeasuredRequirement, on_execution
@@ -23,7 +22,6 @@ from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 STRIDES = 5  # of a periodic motion, played in a row
-FAR = 2.0  # of what is allowed: a plan whose executions differ by more is not refined
 OWN = ("replay", "table_replay")  # the executions on the plan's own model
 
 
@@ -140,31 +138,6 @@ def _played(found: Plan, motion: Trajectory, plant: Model) -> dict[str, Replay |
     """The executions of a longer motion made of a plan."""
     table = controller_table(found.model, motion, found.task.hold)
     return executions(found.model, motion, table, plant)
-
-
-def promising(found: Plan) -> bool:
-    """Whether the plant may keep to a plan that is not refined yet.
-
-    Its table is executed on its own model and on the plant. By how much these differ at the apex
-    and at touchdown is seen before refining, which hardly changes it. True where the plant does not
-    decide, or where nothing can be executed.
-    """
-    task = found.task
-    if truth_of(task).learnt:
-        return True
-    table = controller_table(found.model, found.trajectory, task.hold)
-    try:
-        done = executions(found.model, found.trajectory, table, plant_of(task))
-    except KembaError:
-        return True
-    own, there = done["table_replay"], done["plant_replay"]
-    if own is None or there is None:
-        return True
-    allowed = allowances(task.tolerances, landing_speed(found.trajectory))["plant_replay"]
-    off = [(there.apex_error_m - own.apex_error_m) / allowed.apex]
-    if own.touchdown_error_s is not None and there.touchdown_error_s is not None:
-        off.append((there.touchdown_error_s - own.touchdown_error_s) / allowed.touchdown)
-    return max(abs(share) for share in off) <= FAR
 
 
 def asked_of(found: Plan, done: Replay | None, allowed: Allowed) -> Sequence[MeasuredRequirement]:

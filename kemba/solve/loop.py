@@ -22,7 +22,6 @@ from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent
 from kemba.ocp.starts import plan_best
-from kemba.solve.judged import promising
 from kemba.solve.listener import Listener
 from kemba.solve.repairs import repaired
 from kemba.solve.trial import Begun, Trial, TrialOrder, executed
@@ -146,8 +145,7 @@ def _candidates(
         from kemba.solve.memory import recalled
 
         origin = recalled(task, planning.planner.model, listener.tell)
-    judges = (promising,) if approach.replay else ()
-    for found in planning.plans(origin, *judges):
+    for found in planning.plans(origin):
         yield PlanCandidate(found)
 
 

@@ -1,8 +1,8 @@
-"""Start guesses: which there are, and which of their plans are refined."""
+"""Start guesses: which of their plans are refined."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import casadi as ca
@@ -11,9 +11,9 @@ import pytest
 from kemba.ocp import Plan, load_task
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planner import Planner, searched
-from kemba.ocp.planning import Planning, guesses
+from kemba.ocp.planning import Planning
+from kemba.ocp.refinement import order_of
 from kemba.ocp.transcription.parameters import Parameters
-from kemba.ocp.transcription.symmetry import whole
 
 TURN = ("cost.calm.expression=body/pitch_rate^2", "cost.calm.weight=2")
 
@@ -22,18 +22,42 @@ def planning(name: str, *changes: str) -> Planning:
     return Planning.of(*load_task(name, list(changes)))
 
 
-def test_turning_costs_in_some_guesses_of_a_task_that_asks_legs_for_different_things() -> None:
-    ahead, spot = (guesses(planning(name).planner) for name in ("jump_forward.yaml", "jump.yaml"))
-    assert [bool(guess.turning) for guess in ahead] == [False, True, False, True]
-    assert not any(guess.turning for guess in spot)
-    assert len(set(ahead)) == len(set(spot)) == 4
+def starts(
+    monkeypatch: pytest.MonkeyPatch, solves: Iterator[bool], orders: Iterator[object]
+) -> list[str]:
+    """Where the plans of a task come from. `solves`: whether each refinement does; `orders`: of
+    contacts and valves, as found from each guess."""
+    guess = searched(planning("jump.yaml").planner, refused=True)
+
+    def made(planner: Planner, refused: bool, new: Callable[[Plan], bool]) -> Plan | None:
+        found = replace(guess, status=Status.ACCEPTABLE)
+        return replace(found, refined=next(solves)) if new(found) else None
+
+    monkeypatch.setattr("kemba.ocp.planning.found_and_refined", made)
+    monkeypatch.setattr("kemba.ocp.planning.order_of", lambda *known: next(orders))
+    return [found.start for found in planning("jump.yaml").plans()]
 
 
-def test_turning_costs_only_while_a_plan_is_sought() -> None:
-    planner = replace(planning("jump_forward.yaml").planner, turning=3.0)
-    sought = planner.schedule(20, whole(planner.model.node)).transcription.task
-    assert set(sought.cost) - set(planner.task.cost) == {"turning while sought"}
-    assert searched(planner, refused=True).task == planner.task
+def test_a_plan_of_a_known_order_is_not_refined_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = starts(monkeypatch, iter([True] * 4), iter("aaba"))
+    assert found == ["guess", "guess 3"]
+
+
+def test_an_order_that_could_not_be_refined_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = starts(monkeypatch, iter([False, True, True, True]), iter("aaab"))
+    assert found == ["guess", "guess 2", "guess 4"]
+
+
+def test_the_order_of_a_plan_is_that_of_its_contacts_and_valves() -> None:
+    own = planning("jump.yaml", "nodes=20").planner
+    found = searched(own, refused=True)
+    known = found.model, found.task, found.requirements
+    order = order_of(*known, found.trajectory)
+    assert order and order == order_of(*known, found.trajectory)
+    valve = found.trajectory["front/valve/extend"].copy()
+    valve[3:5] = 1.0 - valve[3:5].round()
+    turned = found.trajectory.with_columns({"front/valve/extend [1]": valve})
+    assert order_of(*known, turned) != order
 
 
 def test_half_a_robot_knows_costs_of_what_is_zero_by_symmetry() -> None:
@@ -47,40 +71,3 @@ def test_half_a_robot_knows_costs_of_what_is_zero_by_symmetry() -> None:
         at = planner.guess(half).Y.ravel(), Parameters(1e-3).vector(half.nodes)
         values.append(float(objective(*at)))
     assert values[0] == pytest.approx(values[1])
-
-
-@pytest.fixture
-def refinement(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
-    """Which plans of further guesses are refined; all have one order of contacts and valves."""
-    refined: list[bool] = []
-    known: list[Plan] = []
-
-    def made(planner: Planner, refused: bool, worth: Callable[[Plan], bool]) -> Plan | None:
-        if not known:
-            known.append(replace(searched(planner, refused=True), status=Status.ACCEPTABLE))
-        refined.append(worth(known[0]))
-        return known[0] if refined[-1] else None
-
-    monkeypatch.setattr("kemba.ocp.planning.found_and_refined", made)
-    return refined
-
-
-def test_a_plan_of_a_known_order_is_not_refined_again(refinement: list[bool]) -> None:
-    found = list(planning("jump.yaml").plans())
-    assert refinement == [True, False, False, False] and len(found) == 1
-
-
-def test_what_is_not_promising_is_not_refined(
-    refinement: list[bool], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    orders = iter(range(100))
-    monkeypatch.setattr("kemba.ocp.planning.order_of", lambda *known: [next(orders)])
-    asked: list[bool] = []
-
-    def third(found: Plan) -> bool:
-        asked.append(len(asked) == 1)
-        return asked[-1]
-
-    starts = [found.start for found in planning("jump.yaml").plans(promising=third)]
-    assert refinement == [True, False, True, False]
-    assert starts == ["guess", "guess 3"]
