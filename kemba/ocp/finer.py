@@ -4,6 +4,7 @@ Contacts and valves of a plan are decided on the coarser grid. Its refined plan 
 program near the solution, so that only a few iterations are made on many nodes.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
 
@@ -21,32 +22,36 @@ NODES = 100
 STEP = 7e-3  # s; a longer motion is sought on more nodes, of such steps: those of the trials
 
 
-def found_and_refined(planner: Planner, refused: bool) -> Plan:
-    """A plan from the guess, refined where the task asks for it; without grip, which comes
-    last."""
+Judge = Callable[[Plan], bool]
+
+
+def found_and_refined(planner: Planner, refused: bool, new: Judge) -> Plan | None:
+    """A plan from the guess, refined where the task asks for it; without grip, which comes last.
+    None where it is not `new`: it is not refined then."""
     if planner.task.refine == "radau" and planner.start is None and not refused:
-        found = _from_fewer(planner)
-        if found is not None:
-            return found
+        fewer = max(NODES, ceil(planner.task.duration / STEP))
+        if planner.task.nodes > fewer:
+            coarse = replace(planner, task=planner.task.model_copy(update={"nodes": fewer}))
+            sought = searched(coarse, False)
+            if sought.status is Status.SOLVED and not new(sought):
+                return None
+            found = _from_fewer(planner, refined(coarse, sought))
+            if found is not None:
+                return found
     found = searched(planner, refused)
     if found.status is Status.SOLVED and planner.task.refine == "radau":
-        found = refined(planner, found)
+        return refined(planner, found) if new(found) else None
     return found
 
 
-def _from_fewer(planner: Planner) -> Plan | None:
-    """The plan on the task's nodes from one on fewer; None where they are few, or where there is
-    none or it cannot be solved on all of them. Where time is up before that, what there is."""
+def _from_fewer(planner: Planner, found: Plan) -> Plan | None:
+    """The plan on the task's nodes from the one `found` on fewer; None where that is not refined or
+    cannot be solved on all of them. Where time is up before that, what there is."""
     task = planner.task
-    fewer = max(NODES, ceil(task.duration / STEP))
-    if task.nodes <= fewer:
-        return None
-    coarse = replace(planner, task=task.model_copy(update={"nodes": fewer}))
-    found = refined(coarse, searched(coarse, False))
     if not found.refined:
         return None if planner.session.control.ended() is None else found
     plain = {"grip": 1.0}  # as the coarser plan was made
-    name = f"the plan on {fewer} nodes"
+    name = f"the plan on {found.task.nodes} nodes"
     origin = Origin(
         found.trajectory, found.model, found.requirements, name, once=True, stages=found.stages
     )

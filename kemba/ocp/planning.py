@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.continued import continued, from_scratch, with_grip
-from kemba.ocp.finer import found_and_refined
+from kemba.ocp.finer import Judge, found_and_refined
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
@@ -26,6 +26,7 @@ from kemba.ocp.nlp.watcher import Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of
+from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.sequence import as_one, motions
 from kemba.ocp.task.requirement import Requirement
@@ -99,7 +100,8 @@ class Planning:
 
     def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
-        the other as long as they give any."""
+        the other as long as they give any; none whose contacts and valves come in the order of an
+        earlier one, as the same program would refine it."""
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -109,18 +111,24 @@ class Planning:
                     return
                 failed = LEFT
             failed = failed if origin.given else ""
-        task, planner = self.planner.task, self.planner
+        task, planner, orders = self.planner.task, self.planner, _Orders()
         for number, guess in enumerate(guesses(task, planner.model)):
+            if number and self.over:
+                return
             if number:
                 planner.session.tell("another guess")
-            found = self._from_guess(guess if planner.start is None else replace(guess, pulse=0.0))
+            own = guess if planner.start is None else replace(guess, pulse=0.0)
+            found = self._from_guess(own, orders.new)
+            if found is None:
+                continue
+            orders.keep(found)
             start = f"guess {number + 1}" if number else found.start
             for each, how in ((found, ""), (found.plain, ", without further pulses")):
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
             only = planner.start is not None or task.refine != "radau"
-            if self.over or only or not found.status.plan:
+            if only or not found.status.plan:
                 return
 
     def continued(self, origin: Origin) -> tuple[Plan | None, str]:
@@ -129,13 +137,17 @@ class Planning:
             found, why = continued(self.planner, origin)
         return found and self._timed(found), why
 
-    def _from_guess(self, guess: StartGuess) -> Plan:
+    def _from_guess(self, guess: StartGuess, new: Judge) -> Plan | None:
+        """The plan from a guess; None where it is not `new`."""
         refused = self.refused
         task = self.planner.task
         begins = task.model_copy(update=guess.update)
         planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None)
         with self.clock.running():
-            found = replace(found_and_refined(planner, refused is not None), task=task)
+            made = found_and_refined(planner, refused is not None, new)
+            if made is None:
+                return None
+            found = replace(made, task=task)
             if found.status is Status.SOLVED and task.grip < 1.0:
                 found = replace(with_grip(self.planner, found), plain=None)
         if not found.status.plan and found.status is not Status.INTERRUPTED:
@@ -159,6 +171,24 @@ class Planning:
             solve_cpu_s=clock.cpu - session.building.cpu,
             build_s=session.building.wall,
         )
+
+
+@dataclass
+class _Orders:
+    """In which orders contacts and valves of refined plans come."""
+
+    known: list[Order] = field(default_factory=list)
+    last: Order | None = None
+
+    def new(self, found: Plan) -> bool:
+        """Whether a plan that is not refined yet has another order than the refined ones."""
+        self.last = order_of(found.model, found.task, found.requirements, found.trajectory)
+        return self.last not in self.known
+
+    def keep(self, found: Plan) -> None:
+        """The last order is known if its plan was refined."""
+        if found.refined and self.last is not None:
+            self.known.append(self.last)
 
 
 def plan(

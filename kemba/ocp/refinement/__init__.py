@@ -1,5 +1,5 @@
 """Plans that replay: the modes of an implicit Euler plan solved again as smooth phases."""
 
-from kemba.ocp.refinement.refine import Refined, refine
+from kemba.ocp.refinement.refine import Order, Refined, order_of, refine
 
-__all__ = ["Refined", "refine"]
+__all__ = ["Order", "Refined", "order_of", "refine"]

@@ -39,6 +39,7 @@ from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory
 
+Order = list[tuple[tuple[int, ...], tuple[float, ...]]]  # modes and valves, phase by phase
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
 UNFIT = "no order of its contacts and stops was found that holds"
 NEAREST, BEST, FINEST = range(3)  # steps of an elastic program
@@ -130,14 +131,9 @@ class Refiner:
 
     def run(self) -> Refined:
         """The first reading that solves, else how the last one ended."""
-        constraints = read_constraints(self.model, self.reduction)
-        inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
-        valves = np.round(inputs[:, valve_columns(self.model, self.reduction)])
         found = Refined(None, None, Ending.GAVE_UP, 0)
         for trim in (False, True):
-            brief = LASTS if self.task.clearance else 0.0
-            plan, marks = self.plan, self.marks
-            phases = read_phases(self.model, constraints, plan, valves, marks, trim, brief)
+            phases = self.phases(trim)
             if phases in self.seen:
                 break
             found = self.exact(phases, self.plan)
@@ -146,6 +142,15 @@ class Refiner:
             if found.done:
                 break
         return replace(self.improved(found), iterations=self.iterations)
+
+    def phases(self, trim: bool = False) -> list[Phase]:
+        """The phases of the plan; see `read_phases`. Raises ValueError for a model to which the
+        method does not apply."""
+        constraints = read_constraints(self.model, self.reduction)
+        inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
+        valves = np.round(inputs[:, valve_columns(self.model, self.reduction)])
+        brief = LASTS if self.task.clearance else 0.0
+        return read_phases(self.model, constraints, self.plan, valves, self.marks, trim, brief)
 
     def improved(self, found: Refined) -> Refined:
         """A solved plan with the pulses of valves that lower its cost."""
@@ -291,6 +296,19 @@ class Refiner:
     def _ended(self, program: PhaseProgram, last: Iterate) -> Refined:
         assert last.ending is not None
         return Refined(None, None, last.ending, self.iterations, tuple(program.phases))
+
+
+def order_of(
+    model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
+) -> Order | None:
+    """In which order a plan's contacts, stops and valves come: plans with the same one are refined
+    by the same program. None for a model to which the method does not apply."""
+    reduction = reduction_of(model, task, requirements, plan)
+    try:
+        phases = Refiner(model, task, requirements, plan, reduction, Control()).phases()
+    except ValueError:
+        return None
+    return [(phase.modes, phase.valves) for phase in phases]
 
 
 def reduction_of(

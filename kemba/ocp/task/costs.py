@@ -46,7 +46,7 @@ def running(
             value = quantity_expression(model, term.expression)
             node = model.node
             symbols = [node.q, node.v, node.s, node.u, node.lam]
-            here = [now[group] for group in ("q", "v", "s", "u", "lam")]
+            here = [ca.densify(now[group]) for group in ("q", "v", "s", "u", "lam")]
             total += term.weight * h * ca.substitute([ca.SX(value)], symbols, here)[0]
         else:
             total += term * COSTS[name](model, now["u"], h)
