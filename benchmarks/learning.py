@@ -167,9 +167,9 @@ def study(hidden: HiddenMachine, way: str, first: Path, folder: Path, last: int)
             facts.append(WAYS[way](run, logs, new))
         except KembaError as error:
             facts.append({"failed": str(error)})
-        if (new / "controller.csv").is_file():
+        if (new / "controller.csv").is_file() and facts[-1].get("good", True):
             run = new
-        else:  # no new plan: the old one is executed again
+        else:  # no new plan that may go to the robot: the old one is executed again
             shutil.rmtree(new, ignore_errors=True)
     return {"rounds": rounds, "facts": facts, "cpu_s": time.process_time() - began}
 

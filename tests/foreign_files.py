@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pytest
 
 from kemba.trajectory import Trajectory
 
@@ -194,7 +195,7 @@ def dataset(log: Trajectory) -> dict[str, dict[str, np.ndarray]]:
 def logs_out(log: Trajectory, path: Path, version: str = "v7") -> Path:
     """The authors' logsOut: a Dataset of signals, each a struct of timeseries, as Simulink
     logs buses; by mat-io in imitation of MATLAB."""
-    import matio
+    matio = pytest.importorskip("matio", reason="mat-io needs Python 3.11")
     from matio.utils.matclass import MatlabOpaque
 
     def series(name: str, values: np.ndarray) -> MatlabOpaque:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from kemba.config import Section, find_config, load_yaml, parse
+from kemba.config import Section, find_config, load_yaml, parse, shipped_configs
 from kemba.errors import ConfigErrors, KembaError
 from kemba.quantity import Param, Quantity, convert
 from kemba.trajectory import TIME
@@ -113,6 +114,16 @@ def load_map(name: str | Path) -> ColumnMap:
     found = parse(load_yaml(path), ColumnMap)
     check_map(found, str(path))
     return found
+
+
+def shipped_maps(names: Collection[str]) -> list[str]:
+    """The shipped maps all of whose columns are among `names`."""
+    own = {name: load_map(name).columns.values() for name in shipped_configs("maps")}
+    return [
+        name.removesuffix(".yaml")
+        for name, columns in own.items()
+        if {source for column in columns for source in column.names} <= set(names)
+    ]
 
 
 def check_map(found: ColumnMap, where: str) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.logs.columns import ColumnMap
+from kemba.logs.columns import ColumnMap, shipped_maps
 from kemba.logs.draft import matching
 from kemba.logs.draft.clock import joint_state_labels, numbers, stamp_of, switches
 from kemba.logs.draft.matching import (
@@ -208,8 +208,14 @@ def draft_map(
         missing,
         tuple(name for name in raw.columns if name not in read),
         tuple(filter(None, [stamp.question, *ties, *asked])),
-        (f"Time: {stamp.reason}.", *said, *raw.remarks, *joined),
+        (f"Time: {stamp.reason}.", *said, *raw.remarks, *joined, *_shipped(raw.columns)),
     )
+
+
+def _shipped(names: Collection[str]) -> list[str]:
+    """Notes on shipped maps that fit these columns."""
+    return [f"the shipped map '{found}' fits these columns: --map {found}"
+            for found in shipped_maps(names)]  # fmt: skip
 
 
 def _spelt(units: Iterable[tuple[str, str]]) -> dict[str, str]:

@@ -254,6 +254,9 @@ def _by_child(path: Path, written: Path) -> tuple[dict[str, Any], dict[str, Colu
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         if said == "PACKAGE":
+            if sys.version_info < (3, 11):
+                what = "holds objects of MATLAB, which mat-io reads with Python 3.11 or newer"
+                raise KembaError(str(path), what, hint="save structs of numbers, as version 7")
             raise missing(path, ImportError(name="mat-io"))
         reason = said if done.returncode > 0 else "it is damaged: its reader crashes"
         raise KembaError(str(path), f"is no MATLAB file that can be read: {reason}", EXPECTED)
