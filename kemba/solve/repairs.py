@@ -33,7 +33,7 @@ def _on_ticks(old: Plan, planning: Planning) -> Plan | None:
     """The plan with its valve edges on ticks; None where that fails in one step, or where it costs
     so much more that another guess is likely to cost less."""
     known = old.trajectory, old.model, old.requirements
-    name = "the earlier plan" if old.continued else "the plan before"
+    name = "the earlier plan" if old.continued else "the same plan with edges between ticks"
     origin = Origin(*known, name, once=True, ticks=True, stages=old.stages)
     near, _ = planning.continued(origin)
     if near is None or near.status is not Status.SOLVED:
