@@ -81,7 +81,7 @@ def asked(effects: Sequence[str], seed: int) -> tuple[float, float, str]:
         paths = logs(effects, seed, Path(name))
         compared, _, _ = waited("compare", paths)
         found, _, answer = waited("discover", paths, "--out", str(Path(name) / "answer"))
-    says = f"{answer['verdict']}: {', '.join(answer['found']) or 'no effect'}"
+    says = f"{answer['verdict']}: {', '.join(answer['added']) or 'no effect'}"
     print(f"{', '.join(effects)}: {compared:.1f} s, {found:.1f} s, {says}", flush=True)
     return compared, found, says
 
@@ -89,7 +89,7 @@ def asked(effects: Sequence[str], seed: int) -> tuple[float, float, str]:
 def beside(other: Path, cases: int | None, times: int) -> Iterator[str]:
     """Lines of the table of CPU seconds beside another build's program."""
     chosen = [*((name,) for name in SINGLE), *SEVERAL][:cases]
-    yield "| hidden | discover, CPU s | the other build | share | they say |"
+    yield "| hidden | discover, CPU s | the other build | share | it says |"
     yield "|---|---:|---:|---:|---|"
     shares = []
     for i, effects in enumerate(chosen):
@@ -102,7 +102,8 @@ def beside(other: Path, cases: int | None, times: int) -> Iterator[str]:
                     out = str(Path(name) / f"{number}-{program.parents[1].name}")
                     _, cpu, answer = waited("discover", paths, "--out", out, program=program)
                     taken[program].append(cpu)
-                    says.append(", ".join(answer["found"]) or answer["verdict"])
+                    if program is OWN:
+                        says.append(", ".join(answer["added"]) or answer["verdict"])
         own, old = (median(seconds) for seconds in taken.values())
         shares.append(own / old)
         told = " / ".join(dict.fromkeys(says))
