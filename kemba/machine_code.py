@@ -2,7 +2,7 @@
 
 LLVM comes with numba. CasADi has shared what is common, and LLVM only keeps values in registers
 (without that the code takes twice as long): a model takes a tenth of a second to translate, and
-its code is forty times quicker than CasADi's own virtual machine.
+its code is twenty times quicker than CasADi's own virtual machine.
 
 Every function also comes as a loop over rows. Where the output of one row is an input of the next,
 as with steps in time, it is written there.

@@ -27,7 +27,7 @@ TOLERANCE = 1e-9  # of the integration, in scales of the states
 
 
 class Buffered:
-    """A function of vectors with dense results, called without copies: twenty times sooner."""
+    """A function of vectors with dense results, called without CasADi's own matrices."""
 
     def __init__(self, function: ca.Function) -> None:
         buffer: Any

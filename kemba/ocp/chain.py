@@ -26,8 +26,7 @@ def joined(parts: Sequence[Trajectory]) -> Trajectory:
         phases += [_later(str(text), nodes) for text in part.meta.get("phases", ())]
         end, x = float(time[-1][-1]), float(columns["body/x"][-1][-1])
         nodes += len(part) - 1
-    joined = map(np.concatenate, columns.values())
-    whole = dict(zip(first.headers, joined, strict=True))
+    whole = dict(zip(first.headers, map(np.concatenate, columns.values()), strict=True))
     meta = {**first.meta, **({"phases": phases} if phases else {})}
     return Trajectory(np.concatenate(time), whole, meta)
 

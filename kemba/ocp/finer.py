@@ -20,8 +20,6 @@ from kemba.ocp.refined import refined
 # none: on 200 a forward jump took 2.6 times as long, on 400 one of three ended at the limit.
 NODES = 100
 STEP = 7e-3  # s; a longer motion is sought on more nodes, of such steps: those of the trials
-
-
 Judge = Callable[[Plan], bool]
 
 

@@ -160,7 +160,7 @@ class Roundings:
 
     def best(self, table: Trajectory, last: float) -> ExecutedTable:
         """The table, or the best of those with edges some ticks away; edges after `last` [s]
-        stay."""
+        stay, none where it is NaN."""
         best, before = self.tried(table), np.inf
         while 1.0 < best.error < before and self.left > 0:
             before = best.error

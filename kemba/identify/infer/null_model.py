@@ -127,11 +127,13 @@ class Baseline:
     """The null hypothesis refitted, with slopes to every effect of the catalogue.
 
     `problem`: the problem under the noise colour learnt. `point`: the null. `table`: linear
-    log evidence of every single effect. `jacobian` (n, k) and `residual` (n,) at the null. `begin`:
-    where the fit of curved figures begins.
+    log evidence of every single effect. `jacobian` (n, k) and `residual` (n,) at the null;
+    `frozen`: slopes along the nuisance parameters, for refits. `begin`: where the fit of curved
+    figures begins.
     """
 
     point: LinearisationPoint
+    frozen: Frozen
     jacobian: Array
     residual: Array
 
@@ -140,13 +142,6 @@ class Baseline:
         self.division = Division(problem)
         self.table: dict[Hypothesis, float] = {}
         self._start()
-
-    @property
-    def frozen(self) -> Frozen:
-        """Slopes along the nuisance parameters, for refits."""
-        names = tuple(self.problem.nuisance)
-        at = [self.point.linear.index(n) for n in names]
-        return Frozen(names, self.jacobian[:, at])
 
     def ranker(self, linear: Linear, spike: float | None = None) -> Ranker:
         """Scores hypotheses on `linear`; `spike`: width of absent effects in sizes (None: the
@@ -186,6 +181,8 @@ class Baseline:
         names = names_of(self.problem, theta)
         self.jacobian = self.problem.jacobian(theta, names) if jacobian is None else jacobian
         self.residual = self.problem.residual(theta)
+        figures = tuple(self.problem.nuisance)  # the first of the names
+        self.frozen = Frozen(figures, self.jacobian[:, : len(figures)].copy())
         self.score(theta, names)
         self.table = self.ranker(self.point.mode.linear).table()
 

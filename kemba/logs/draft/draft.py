@@ -198,7 +198,7 @@ def draft_map(
         t.header for t in targets if t.needed and t.header not in {*found.pairs, *found.ties}
     )
     ties = [f"{header} may be {_either(names_)}" for header, names_ in found.ties.items()]
-    joined = [
+    unwrapped = [
         f"{h} begins anew after each turn: joined" for h, s in columns.items() if "unwrap" in s
     ]
     return Draft(
@@ -208,7 +208,7 @@ def draft_map(
         missing,
         tuple(name for name in raw.columns if name not in read),
         tuple(filter(None, [stamp.question, *ties, *asked])),
-        (f"Time: {stamp.reason}.", *said, *raw.remarks, *joined, *_shipped(raw.columns)),
+        (f"Time: {stamp.reason}.", *said, *raw.remarks, *unwrapped, *_shipped(raw.columns)),
     )
 
 
