@@ -36,6 +36,29 @@ class Lag(Problem):
         return Rows(zeros, zeros, self._time, label, label, ("F",), np.ones(600))
 
 
+class Saturated(Problem):
+    """A reading that saturates, where a full Gauss-Newton step from afar leads farther away, and an
+    effect `idle` that shows nowhere."""
+
+    runs = ("one",)
+
+    def __init__(self) -> None:
+        self.nuisance = {"slope": (0.0, 0.5)}
+        self.candidates = {
+            name: Candidate(name, Parameter("a", "N", 0.0, 10.0)) for name in ("push", "idle")
+        }
+        self._time = np.arange(100) / 1e3
+
+    def residual(self, theta: Theta) -> Array:
+        reading = 50.0 * np.arctan((theta.get("push.a", 0.0) - 12.0) / 4.0)
+        return np.asarray(reading + theta.get("slope", 0.0) * self._time)
+
+    def rows(self) -> Rows:
+        label = np.full(100, "moving")
+        zeros = np.zeros(100, int)
+        return Rows(zeros, zeros, self._time, label, label, ("F",), np.ones(100))
+
+
 def frozen(problem: Problem) -> Frozen:
     names = tuple(problem.nuisance)
     return Frozen(names, problem.jacobian({}, names))
@@ -59,12 +82,26 @@ def test_a_refit_ends_at_the_minimum() -> None:
     secant = problem.residual({**found.theta, "lag.T": found.theta["lag.T"] + step})
     secant = (secant - problem.residual(found.theta)) / step
     assert found.columns["lag.T"] == pytest.approx(secant, rel=0.05, abs=0.05 * np.ptp(secant))
+    curved = problem.jacobian(found.theta, ["gain"])[:, 0]
+    assert found.columns["gain"] == pytest.approx(curved, abs=0.01 * np.ptp(curved))
+
+
+def test_steps_that_lead_farther_away_are_not_taken() -> None:
+    problem = Saturated()
+    found = refit(problem, ("push",), {"push.a": 30.0}, frozen(problem))
+    assert found.theta["push.a"] == pytest.approx(12.0, abs=0.1)
+
+
+def test_an_effect_that_shows_nowhere_stays_where_its_prior_has_it() -> None:
+    problem = Saturated()
+    found = refit(problem, ("idle", "push"), {"push.a": 14.0, "idle.a": 20.0}, frozen(problem))
+    assert found.theta["idle.a"] == pytest.approx(0.0, abs=0.1)
 
 
 def test_an_effect_that_only_the_other_sign_would_explain_stays_on_at_its_bound() -> None:
     problem = Lag(late=-0.01)
     found = refit(problem, ("lag",), {}, frozen(problem))
-    assert 0.0 < found.theta["lag.T"] < 1e-6
+    assert 1e-13 < found.theta["lag.T"] < 1e-6
 
 
 def test_what_is_linear_takes_one_step() -> None:
