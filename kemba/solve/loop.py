@@ -24,7 +24,7 @@ from kemba.ocp.planning import Planning, spent
 from kemba.ocp.starts import plan_best
 from kemba.solve.listener import Listener
 from kemba.solve.repairs import repaired
-from kemba.solve.trial import Begun, Trial, TrialOrder, executed
+from kemba.solve.trial import Trial, TrialOrder, executed
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -76,18 +76,15 @@ def best_plan(
     document: Document,
     approach: Approach,
     listener: Listener,
-    begun: Begun | None = None,
     place: str = "",
 ) -> Trial:
     """The plan of a task, executed and judged: the first good one, or the best of all tried.
 
-    `begun` gets each plan before it is executed, at last the one that is returned. `place`: the
-    run folder in the answer. All of it ends at the task's `solver.time_limit`. Raises KembaError
-    where the task or a file is wrong.
+    `place`: the run folder in the answer. All of it ends at the task's `solver.time_limit`. Raises
+    KembaError where the task or a file is wrong.
     """
     deadline = time.monotonic() + task.solver.time_limit
-    begun = begun or (lambda plan: None)
-    execution = TrialOrder(approach.replay, listener.tell, begun, place)
+    execution = TrialOrder(approach.replay, listener.tell, place)
     planning = _planning(task, document, approach, listener, deadline)
     best = last = None
     for one in _candidates(planning, approach, listener, deadline):
@@ -102,8 +99,6 @@ def best_plan(
         from kemba.solve.robust import with_share
 
         best = with_share(best)
-    if best is not last and best.motions.table is not None:
-        begun(best.plan.trajectory)
     if approach.memory:
         from kemba.solve.memory import best_known
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,18 +21,16 @@ from kemba.trajectory import Trajectory
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
 
-Begun = Callable[[Trajectory], None]
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
 @dataclass(frozen=True)
 class TrialOrder:
-    """How plans are executed: whether they are at all, who is told, who gets each plan before
-    (`begun`), and the run folder in the answer."""
+    """How plans are executed: whether they are at all, who is told, and the run folder in the
+    answer."""
 
     replay: bool = True
     tell: Tell = silent
-    begun: Begun = lambda plan: None
     place: str = ""
 
 
@@ -116,8 +114,6 @@ def executed(
     result = answer(found, execution.place)
     if table is None and found.attempts:
         table = controller_table(found.model, found.trajectory, found.task.hold)
-    if table is not None:
-        execution.begun(found.trajectory)
     if table is None or not execution.replay or not found.status.plan:
         return Trial(found, result, Motions(table), repair=repair)
     wait_for_compiler(execution.tell)
