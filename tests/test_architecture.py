@@ -127,7 +127,7 @@ PLANNING = [
     "phases",
     "refinement",
 ]
-PLANNING += ["continuation", "infeasibility", "planned", "planner", "refined", "continued"]
+PLANNING += ["continuation", "infeasibility", "planned", "planner", "continued", "finer"]
 PLANNING += ["planning", "starts"]
 
 

@@ -37,8 +37,10 @@ CONSTANTS = {  # file -> names, why
     "effects/mechanics/hip.py": ("W_COULOMB", "smoothing width of a formula"),
     "effects/base.py": ("REMEASURED", "tolerance of what a discovery has measured"),
     "effects/sensors.py": ("CHANNELS", "noise of the robot's sensors"),
-    "mechanism/pin_model.py": ("COUNTER_CLOCKWISE DOWN", "directions"),
-    "mechanism/robot.py": ("HIP_RANGE", "geometry: where the knee would rise above the body"),
+    "mechanism/robot.py": (
+        "HIP_RANGE COUNTER_CLOCKWISE DOWN",
+        "geometry: where the knee would rise above the body; directions",
+    ),
     "plant/tables.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
     "plant/rigs.py": (
         "FORCE_NOISE VALVES SPEEDS",
@@ -54,11 +56,10 @@ CONSTANTS = {  # file -> names, why
         "steps of the robot's encoders; scatter of the robot's valves",
     ),
     "plant/controller.py": ("PERIOD", "rate of the robot's controller"),
-    "ocp/mpcc/homotopy.py": (
-        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED",
+    "ocp/mpcc/solve.py": (
+        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL",
         "figures of a general method, chosen on NOSBENCH (benchmarks/pages/nosbench.md)",
     ),
-    "ocp/mpcc/solve.py": ("TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL", "the same"),
     "ocp/mpcc/stationary.py": ("STEP LONGEST", "the same"),
     "ocp/nlp/ending.py": ("USUAL", "iterations of which a median is taken"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
