@@ -27,24 +27,25 @@ TOLERANCE = 1e-9  # of the integration, in scales of the states
 
 
 class Buffered:
-    """A function of vectors with dense results, called without CasADi's own matrices."""
+    """A function of dense arrays with dense results, called without CasADi's own matrices."""
 
     def __init__(self, function: ca.Function) -> None:
         buffer: Any
         buffer, self._evaluate = function.buffer()
-        self._given = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
-        flat = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        self._found = [a.reshape(function.size_out(i), order="F") for i, a in enumerate(flat)]
-        for i, given in enumerate(self._given):
-            buffer.set_arg(i, given.data)
-        for i, found in enumerate(flat):
-            buffer.set_res(i, found.data)
+        given = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        found = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        for i, flat in enumerate(given):
+            buffer.set_arg(i, flat.data)
+        for i, flat in enumerate(found):
+            buffer.set_res(i, flat.data)
+        self._given = [a.reshape(function.size_in(i), order="F") for i, a in enumerate(given)]
+        self._found = [a.reshape(function.size_out(i), order="F") for i, a in enumerate(found)]
         self._buffer = buffer  # the evaluation holds no reference to it
 
-    def __call__(self, *vectors: Array) -> list[Array]:
+    def __call__(self, *arrays: Array) -> list[Array]:
         """The results, which hold until the next call."""
-        for given, values in zip(self._given, vectors, strict=True):
-            given[:] = values
+        for given, values in zip(self._given, arrays, strict=True):
+            given[:] = np.reshape(values, given.shape)
         self._evaluate()
         return self._found
 

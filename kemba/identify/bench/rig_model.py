@@ -13,17 +13,15 @@ from kemba.effects.pneumatics.switching import Pulse, delayed, instants, is_on
 from kemba.effects.series import Series
 from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.problem.types import Array
-from kemba.model.exponential import midpoint_step
+from kemba.model.along import StatesAlong
 from kemba.model.model import Model
-from kemba.model.node import Node
-from kemba.model.rest import Rest, rate_of
+from kemba.model.rest import Buffered
 
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
 
 Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 STEP = 1.5e-3  # longest step [s]: a fifth of the fastest rise time of Table I, 8 ms
-CHUNK = 512  # steps per call of a compiled function
 # time around a switching in which its effect on a sample is uncertain [s]: over half a row of 1
 # ms; a log does not say on which side its sample was taken
 BLUR = 0.75e-3
@@ -46,17 +44,15 @@ class RigModel:
         self.model, self.names = model, (*free, *scaled)
         node = model.build(free, scaled)
         self.state_names = tuple(q.name for q in model.states.values())
-        rate = rate_of(node)
+        self._along = StatesAlong(model, node)
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
-        self._rest = Rest(node.s, inputs[1:], rate, list(model.states.values()))
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.u).T)
         self._functions = {
-            "step": _step(node, rate),
             "force": ca.Function("force", inputs, [ca.densify(force)]),
             "output": ca.Function("output", inputs, [ca.densify(results)]),
         }
-        self._maps: dict[tuple[str, int], _Call] = {}
+        self._maps: dict[tuple[str, int], Buffered] = {}
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""
@@ -89,60 +85,26 @@ class RigModel:
         x, (v0, a) = moved.value, moved.rates
         fixed = np.repeat(p[:, None], n, axis=1)
         states = dict(zip(self.state_names, s, strict=True))
-        out = self._mapped("output", n)(s, x, v0, a, blurred, fixed)
+        out = self._mapped("output", n)(s, x, v0, a, blurred, fixed)[0].copy()
         force = V_MIDDLE * out[0]
         for place, weight in V_NODES:
             v = v0 + place * motion.v_sigma
-            force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0]
+            force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0][0]
         return Prediction(force, out[1:3].T, blurred.T, states)
 
     def _integrate(
         self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
     ) -> Array:
         middle = 0.5 * (times[:-1] + times[1:])
-        s0 = self._rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
+        s0 = self._along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
         s0 += np.array([start.get(name, 0.0) for name in self.state_names])
-        n = len(times) - 1
         moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
-        inputs = np.stack([np.diff(times), *moved, *u[:, :-1]])
-        inputs = np.pad(inputs, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
-        fixed = np.repeat(p[:, None], CHUNK, axis=1)
-        step, states = self._mapped("step", CHUNK), [s0[:, None]]
-        for i in range(0, inputs.shape[1], CHUNK):
-            states.append(step(states[-1][:, -1], inputs[:, i : i + CHUNK], fixed))
-        return np.concatenate(states, axis=1)[:, : n + 1]
+        return self._along.run(s0, np.stack([np.diff(times), *moved, *u[:, :-1]]), p)
 
-    def _mapped(self, kind: str, n: int) -> _Call:
+    def _mapped(self, kind: str, n: int) -> Buffered:
         if (kind, n) not in self._maps:
-            one = self._functions[kind]
-            self._maps[kind, n] = _Call(one.mapaccum(n) if kind == "step" else one.map(n))
+            self._maps[kind, n] = Buffered(self._functions[kind].map(n))
         return self._maps[kind, n]
-
-
-class _Call:
-    """A CasADi function called on NumPy arrays without copying element by element."""
-
-    def __init__(self, function: ca.Function) -> None:
-        self._buffer, self._evaluate = function.buffer()
-        self._function, self._shape = function, function.size_out(0)
-
-    def __call__(self, *arguments: Array) -> Array:
-        kept = [np.asfortranarray(a, dtype=float).reshape(-1, order="F") for a in arguments]
-        for i, a in enumerate(kept):
-            self._buffer.set_arg(i, memoryview(a))  # type: ignore[call-arg, arg-type]
-        out = np.zeros(self._shape[0] * self._shape[1])
-        self._buffer.set_res(0, memoryview(out))  # type: ignore[call-arg, arg-type]
-        self._evaluate()
-        return out.reshape(self._shape, order="F")
-
-
-def _step(node: Node, rate: ca.SX) -> ca.Function:
-    """(s, d, p) -> s after one step; d: its length, x, v and a in its middle, the two valves."""
-    d = ca.SX.sym("d", 6)
-    inputs = [node.q, node.v, node.a, node.u, node.p]
-    given = [d[1], d[2], d[3], d[4:6], node.p]
-    after, _ = midpoint_step(rate, node.s, inputs, given, d[0])
-    return ca.Function("step", [node.s, d, node.p], [ca.densify(after)], {"cse": True})
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
