@@ -1,7 +1,7 @@
 """What a bench log should read under a model, with effects on its list and sensors as they are."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -104,42 +104,6 @@ def absolute_pressure(channel: str, states: Mapping[str, Array], cylinder: Cylin
 # beginning of a log that tells whether a valve had just been switched [s]: twice the slowest
 # rise time of Table I
 EARLY = 0.08
-
-
-@dataclass(frozen=True)
-class PredictedLogs:
-    """Bench logs with the predictor of one model.
-
-    `starts`: name in theta -> (index of the log, name of the state), for every state whose value at
-    the start of a log is free.
-    """
-
-    logs: tuple[BenchLog, ...]
-    predictor: BenchPredictor
-    starts: Mapping[str, tuple[int, str]]
-
-    @property
-    def stroke(self) -> float:
-        """Stroke of the cylinder [m]."""
-        return self.predictor.model.mechanism.stroke
-
-    def readings(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
-        """Channel of log `index` -> what should have been measured (n,) and its variance (n,), in
-        the channel's unit."""
-        start = {name: theta.get(key, 0.0) for key, (i, name) in self.starts.items() if i == index}
-        return self.predictor.readings(self.logs[index], theta, start)
-
-    def standardised(self, theta: Theta, index: int) -> dict[str, Array]:
-        """Channel of log `index` -> (predicted - measured) / sigma of its rows, not whitened."""
-        return standardised(self.logs[index], self.readings(theta, index))
-
-    def motion(self, theta: Theta, index: int) -> SmoothedMotion:
-        """The motion of log `index` without the position sensor's faults."""
-        return self.predictor.true_motion(self.logs[index], theta)
-
-    def acting(self, theta: Theta, index: int) -> Array:
-        """Share of each sample's neighbourhood in which the two valves act (n, 2)."""
-        return self.predictor.acting(self.logs[index], theta)
 
 
 def standardised(log: BenchLog, readings: Mapping[str, tuple[Array, Array]]) -> dict[str, Array]:

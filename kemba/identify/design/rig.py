@@ -70,7 +70,7 @@ class VirtualBench:
 def _with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
     """The same problem on as many other logs."""
     found = copy(problem)
-    found.predicted = replace(problem.predicted, logs=tuple(logs))
+    found.logs = tuple(logs)
     found.runs = tuple(log.name for log in logs)
     return found
 
@@ -79,7 +79,7 @@ def as_predicted(problem: BenchProblem, theta: Theta) -> BenchProblem:
     """The problem of logs in which everything is as the model at theta has it."""
     logs = []
     for i, log in enumerate(problem.logs):
-        readings = problem.predicted.readings(theta, i)
+        readings = problem.readings(theta, i)
         logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
     return _with_logs(problem, logs)
 

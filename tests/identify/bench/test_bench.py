@@ -135,7 +135,7 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     log = bench_log()
     model = load_model(rig=True)
     bare = bench_problem([log], model)
-    states = bare.predicted.predictor.predict(bare.logs[0], {}).states
+    states = bare.predictor.predict(bare.logs[0], {}).states
     columns = {
         f"{c} [Pa]": absolute_pressure(c, states, model.mechanism.need_cylinder())
         + 500 * np.random.default_rng(0).standard_normal(len(log))
