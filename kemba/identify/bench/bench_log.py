@@ -13,7 +13,7 @@ from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
 from kemba.identify.logs.excerpt import held
-from kemba.identify.logs.limits import LimitSettings
+from kemba.identify.logs.limits import ROW
 from kemba.identify.problem.noise import difference_sigma, telling
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags
@@ -22,24 +22,22 @@ from kemba.trajectory import Trajectory
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 
 
-class BenchLogSettings:
-    """How a bench log is prepared."""
-
-    finest_force = 0.2  # smallest noise of the force sensor [N]
-    finest_pressure = 100.0  # smallest noise of a pressure sensor [Pa]
-    finest_share = 5e-4  # noise that is added, as a share of a channel's range
-    gap = 0.012  # longest gap of the position that is bridged [s]
-    # time after which chambers do not depend on the moment of a switching [s]: three times the
-    # slowest rise time of Table I
-    memory = 0.12
-    neighbours = 9  # samples over which the largest error of the velocity counts
-    # usual damping, by which an error of the velocity makes one of the force [N.s.m-1]
-    damping = 60.0
-    # usual friction of a cylinder, in doubt where the direction of motion is in doubt [N]: the
-    # tables of the paper imply 6 to 8 N
-    friction = 10.0
-    creeping = 200.0  # damping that a slow piston has in addition [N.s.m-1]
-    creep = 0.08  # speed up to which it has it [m.s-1]
+# How a bench log is prepared.
+FINEST_FORCE = 0.2  # smallest noise of the force sensor [N]
+FINEST_PRESSURE = 100.0  # smallest noise of a pressure sensor [Pa]
+FINEST_SHARE = 5e-4  # noise that is added, as a share of a channel's range
+GAP = 0.012  # longest gap of the position that is bridged [s]
+# time after which chambers do not depend on the moment of a switching [s]: three times the
+# slowest rise time of Table I
+MEMORY = 0.12
+NEIGHBOURS = 9  # samples over which the largest error of the velocity counts
+# usual damping, by which an error of the velocity makes one of the force [N.s.m-1]
+DAMPING = 60.0
+# usual friction of a cylinder, in doubt where the direction of motion is in doubt [N]: the
+# tables of the paper imply 6 to 8 N
+FRICTION = 10.0
+CREEPING = 200.0  # damping that a slow piston has in addition [N.s.m-1]
+CREEP = 0.08  # speed up to which it has it [m.s-1]
 
 
 @dataclass(frozen=True)
@@ -74,11 +72,10 @@ class BenchLog:
     def velocity_error(self) -> Array:
         """Force error (n,) [N] that the error of the velocity makes, alike for every hypothesis:
         damping, and a friction of usual size where the direction of motion is in doubt."""
-        usual = BenchLogSettings
-        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, usual.neighbours)
+        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, NEIGHBOURS)
         high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
-        slope = usual.damping + usual.creeping * np.exp(-((v / usual.creep) ** 2))
-        return np.asarray(slope * self.motion.v_sigma + 0.5 * usual.friction * (high - low))
+        slope = DAMPING + CREEPING * np.exp(-((v / CREEP) ** 2))
+        return np.asarray(slope * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
 
 
 def prepare(
@@ -108,7 +105,7 @@ def prepare(
 def _seen_within(time: Array) -> float:
     """Time [s] between rows where it is so long that valve edges are blurred, else 0."""
     step = float(np.median(np.diff(time)))
-    return step if step > LimitSettings.row else 0.0
+    return step if step > ROW else 0.0
 
 
 def _noise_of(channel: str, y: Array) -> float:
@@ -116,10 +113,9 @@ def _noise_of(channel: str, y: Array) -> float:
 
     It is never below a small least noise, so that simulated logs without any noise can be judged.
     """
-    settings = BenchLogSettings
-    least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
+    least = FINEST_FORCE if channel == "piston/F" else FINEST_PRESSURE
     spread = float(np.ptp(y[np.isfinite(y)]))
-    return max(difference_sigma(y), least + settings.finest_share * spread)
+    return max(difference_sigma(y), least + FINEST_SHARE * spread)
 
 
 def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
@@ -128,12 +124,11 @@ def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
     Where a valve switched within a gap, the moment is not known. The rows after such a gap count
     again when the chambers no longer depend on that moment.
     """
-    settings = BenchLogSettings
     known = np.flatnonzero(good)
-    wide = np.flatnonzero(np.diff(time[known]) > settings.gap)
+    wide = np.flatnonzero(np.diff(time[known]) > GAP)
     hidden = np.zeros(len(time), dtype=bool)
     for begin, end in zip(known[wide], known[wide + 1], strict=True):
         switched = np.any(sent[:, begin] != sent[:, end])
-        after = time[end] + (settings.memory if switched else settings.gap)
+        after = time[end] + (MEMORY if switched else GAP)
         hidden |= (time > time[begin]) & (time < after)
     return hidden

@@ -10,7 +10,7 @@ from typing_extensions import Self
 from kemba.effects.pneumatics.switching import changes
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
-from kemba.identify.bench.bench_log import BenchLog, BenchLogSettings, prepare
+from kemba.identify.bench.bench_log import FRICTION, BenchLog, prepare
 from kemba.identify.bench.forces import features, terms
 from kemba.identify.bench.motion import SmoothedMotion, position_noise
 from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, settle_starts, standardised
@@ -188,7 +188,7 @@ class BenchProblem(ColouredProblem):
             for i, sent in enumerate(self.commands()):
                 own = rows.run == i
                 after[side][own] = risen(*sent[f"valve/{side}"], rows.time[own])
-        return [ForceChannel("rod", "N", BenchLogSettings.friction, quantities, columns, after)]
+        return [ForceChannel("rod", "N", FRICTION, quantities, columns, after)]
 
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
@@ -232,7 +232,7 @@ class BenchProblem(ColouredProblem):
         friction."""
         forces = (dict(terms(*self._along(theta, i)))[formula] for i in range(len(self.logs)))
         peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
-        return peak / BenchLogSettings.friction
+        return peak / FRICTION
 
     def leftover(self, theta: Theta) -> Leftover:
         """Force residual over its noise and over what every model leaves, and what it may depend

@@ -55,27 +55,25 @@ def _sensor_sigmas(model: Model, logs: Sequence[RigLog]) -> dict[str, float]:
     return found
 
 
-class RigSizeSettings:
-    """What matters on a rig of the user's own."""
-
-    # usual friction of a cylinder over its bore [N.m-1]: cylinders of 25 mm break away at about 0.1
-    # bar, which is 5 N
-    seal = 200.0
-    drive = 0.05  # usual friction of a drive over its largest force
-    large = 95.0  # percentile of the rows that counts as the largest [%]
-    fading = 0.2  # rate at which a Stribeck friction fades, over the largest rate
-    stretch = 1e-3  # travel until contacts slide, over the whole travel
-    cushion = 0.1  # length of a cushion, over the whole travel
-    periods = 300  # periods that are tried for a cogging force
+# What matters on a rig of the user's own.
+# usual friction of a cylinder over its bore [N.m-1]: cylinders of 25 mm break away at about 0.1
+# bar, which is 5 N
+SEAL = 200.0
+DRIVE = 0.05  # usual friction of a drive over its largest force
+LARGE = 95.0  # percentile of the rows that counts as the largest [%]
+FADING = 0.2  # rate at which a Stribeck friction fades, over the largest rate
+STRETCH = 1e-3  # travel until contacts slide, over the whole travel
+CUSHION = 0.1  # length of a cushion, over the whole travel
+PERIODS = 300  # periods that are tried for a cogging force
 
 
 def usual_force(predictor: Predictor, logs: Iterable[RigLog]) -> float:
     """A friction [N or N.m] that is neither small nor large on this rig."""
-    settings, bore = RigSizeSettings, predictor.model.mechanism.bore
+    bore = predictor.model.mechanism.bore
     if bore is not None:
-        return settings.seal * bore.bore
+        return SEAL * bore.bore
     forces = [np.abs(log.channels.others[predictor.answer]) for log in logs]
-    return settings.drive * float(np.percentile(np.concatenate(forces), settings.large))
+    return DRIVE * float(np.percentile(np.concatenate(forces), LARGE))
 
 
 def sized(
@@ -86,7 +84,6 @@ def sized(
     usual, found = usual_force(predictor, logs), {}
     typical = _typical(predictor, logs)
     base = np.concatenate([predictor.gap(log, {}) for log in logs])
-    percent = RigSizeSettings.large
     for name, candidate in candidates.items():
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
@@ -96,7 +93,7 @@ def sized(
             trial = _with_units(_shaped(candidate, typical), predictor)
         theta = trial.typical()
         change = np.concatenate([predictor.gap(log, theta) for log in logs]) - base
-        reach = float(np.percentile(np.abs(change), percent))
+        reach = float(np.percentile(np.abs(change), LARGE))
         if not np.isfinite(reach) or reach < 1e-9 * usual:
             continue
         scalable = not candidate.sensor and trial.lead.off == 0.0 and trial.lead.unit != "s"
@@ -113,7 +110,7 @@ def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate
     if stretch is None:
         return False
     speed = np.concatenate([np.abs(log.speed) for log in logs])
-    fast = float(np.percentile(speed, RigSizeSettings.large))
+    fast = float(np.percentile(speed, LARGE))
     return fast * candidate.lead.size < stretch[1]
 
 
@@ -144,15 +141,14 @@ def _with_units(candidate: Candidate, predictor: Predictor) -> Candidate:
 
 def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]:
     """Where the search for shapes starts, by name in theta."""
-    settings = RigSizeSettings
     speed = np.concatenate([np.abs(log.speed) for log in logs])
     places = np.concatenate([log.channels.q[log.channels.rows] for log in logs])
-    fast, travel = float(np.percentile(speed, settings.large)), float(np.ptp(places))
+    fast, travel = float(np.percentile(speed, LARGE)), float(np.ptp(places))
     found = {
-        "stribeck_friction.v_b": settings.fading * fast,
-        "axis_stribeck.v_b": settings.fading * fast,
-        "presliding.travel": settings.stretch * travel,
-        "end_cushion.L": settings.cushion * travel,
+        "stribeck_friction.v_b": FADING * fast,
+        "axis_stribeck.v_b": FADING * fast,
+        "presliding.travel": STRETCH * travel,
+        "end_cushion.L": CUSHION * travel,
     }
     if "cogging" in predictor.candidates:
         period, phase = _strongest_period(predictor, logs)
@@ -175,9 +171,8 @@ def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[f
     left = _residual(base, force)
     travel = float(np.ptp(q))
     finest = max(travel / 300.0, 4.0 * float(np.median(np.abs(np.diff(q)))) + 1e-12)
-    count = RigSizeSettings.periods
     best, answer = 0.0, (travel / 3.0, 1.0)
-    for period in np.geomspace(min(finest, travel / 3.0), travel / 1.5, count):
+    for period in np.geomspace(min(finest, travel / 3.0), travel / 1.5, PERIODS):
         wave = np.exp(2j * np.pi * q / period)
         power = abs(complex(np.vdot(wave, left)))
         if power > best:

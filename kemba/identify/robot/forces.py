@@ -173,17 +173,17 @@ def _drag_terms(name: str, v: Array) -> Iterator[tuple[str, Array]]:
     yield f"v{name}**3", v**3
 
 
-class RobotMissingSettings:
-    """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
-
-    memory = 0.025  # correlation time of the missing force [s]
-    rounds = 4  # rounds in which its strength is learnt
-    body = 5.0  # strength with which learning begins [N]
-    pitch = 0.5  # the same of the moment on the body [N.m]
-    hip = 0.5  # the same of the torque at a hip [N.m]
-    piston = 10.0  # the same of the force on a rod [N]
-    negligible = 0.1  # strength of a force that is as good as none [N]
-    negligible_moment = 0.01  # the same of a moment [N.m]
+# The missing force of robot logs. Its strength (1 sigma) is learnt per channel.
+MEMORY = 0.025  # correlation time of the missing force [s]
+ROUNDS = 4  # rounds in which its strength is learnt
+# of each channel: its unit, the strength with which learning begins, one that is as good as none
+STRENGTHS = {
+    "body/x": ("N", 5.0, 0.1),
+    "body/z": ("N", 5.0, 0.1),
+    "body/pitch": ("N.m", 0.5, 0.01),
+    "hip/q": ("N.m", 0.5, 0.01),
+    "piston/x": ("N", 10.0, 0.1),
+}
 
 
 def robot_missing(
@@ -194,23 +194,19 @@ def robot_missing(
     `strength` (k,): 1 sigma of each channel's force; learnt when not given.
     """
     names = state.physics.channels
-    kinds = [_kind(name) for name in names]
-    settings = RobotMissingSettings
-    begin = np.array([getattr(settings, kind) for kind in kinds])
-    sigma = begin if strength is None else strength
-    moment = np.isin(kinds, ("pitch", "hip"))
-    least = np.where(moment, settings.negligible_moment, settings.negligible)
+    usual = (STRENGTHS["/".join(name.split("/")[-2:])] for name in names)
+    units, begin, least = zip(*usual, strict=True)
+    sigma = np.array(begin) if strength is None else strength
     quiet = densities(state.physics, state.batch, state.schedules, QUIET)
     y, g = state.measurement(theta), state.acceleration(theta)
     valid, k = state.batch.valid, len(names)
-    for _ in range(settings.rounds if strength is None else 1):
+    for _ in range(ROUNDS if strength is None else 1):
         system = _with_forces(state, quiet, sigma)
         x, variance = smooth_with_band(system, gains(system), y, g)
         power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
         ratio = np.sqrt(power) / sigma
         # towards nothing such rounds creep, so that their steps are doubled
         used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
-    units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
     found = []
     for i, log in enumerate(state.batch.resampled):
         n = len(log.time)
@@ -218,11 +214,6 @@ def robot_missing(
         down = spans(log.time, state.schedules[i].phase != "flight")
         found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
     return found
-
-
-def _kind(channel: str) -> str:
-    last = channel.split("/")[1] if channel.count("/") > 1 else channel
-    return {"body/pitch": "pitch", "hip": "hip", "piston": "piston"}.get(last, "body")
 
 
 def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
@@ -238,7 +229,7 @@ def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System
     F[..., :d, :d] = base.F
     accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
     F[..., :d, d:] = accelerations
-    keep = np.exp(-h / RobotMissingSettings.memory)
+    keep = np.exp(-h / MEMORY)
     i = np.arange(k)
     F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
     j = base.G.shape[3]
