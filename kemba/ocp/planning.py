@@ -21,8 +21,7 @@ from kemba.ocp.finer import Judge, found_and_refined
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
-from kemba.ocp.nlp.ipopt import Control
-from kemba.ocp.nlp.watcher import Watch
+from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of

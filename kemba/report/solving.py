@@ -13,7 +13,7 @@ from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.origin import write_stages
 from kemba.runs import PLANT_RUN, STAGES, RunFolder
 from kemba.solve import Approach, best_plan
-from kemba.solve.listener import Listener
+from kemba.solve.loop import Listener
 from kemba.solve.memory import remember
 from kemba.solve.trial import Motions
 from kemba.trajectory import Trajectory

@@ -11,7 +11,7 @@ give the trial of the best score
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,15 +22,25 @@ from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.continued import dear
+from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent
 from kemba.ocp.starts import plan_best
-from kemba.solve.listener import Listener
 from kemba.solve.trial import Trial, TrialOrder, executed
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
+
+
+@dataclass(frozen=True)
+class Listener:
+    """What is called at each stage and iteration, and what may ask to stop."""
+
+    tell: Tell = silent
+    watch: Watch | None = None
+    stop: Callable[[], bool] | None = None
 
 
 TICKS = "valve edges on the ticks of the controller"

@@ -5,7 +5,7 @@ import itertools
 import casadi as ca
 import numpy as np
 
-from kemba.model.impact import felt
+from kemba.mechanism.knee import felt
 from kemba.ocp.phases.independent import Independent
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, View, Where

@@ -23,8 +23,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from kemba.mechanism.knee import felt
 from kemba.model import Model
-from kemba.model.impact import felt
 from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
