@@ -127,7 +127,7 @@ PLANNING = [
     "phases",
     "refinement",
 ]
-PLANNING += ["continuation", "infeasibility", "planned", "planner", "continued", "finer"]
+PLANNING += ["continuation", "infeasibility", "planned", "planner", "finer"]
 PLANNING += ["planning", "starts"]
 
 

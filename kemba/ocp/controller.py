@@ -6,8 +6,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.edges import ValveEdges, rounded
-from kemba.ocp.phases.modes import OPEN
-from kemba.ocp.phases.notes import LETTERS, PHASE
+from kemba.ocp.phases.modes import LETTERS, OPEN, PHASE
 from kemba.trajectory import Array, Trajectory
 
 PERIOD = 1e-3  # s

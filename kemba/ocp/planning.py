@@ -16,8 +16,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
-from kemba.ocp.continued import continued, from_scratch, with_grip
-from kemba.ocp.finer import Judge, found_and_refined
+from kemba.ocp.finer import Judge, continued, found_and_refined, from_scratch, with_grip
 from kemba.ocp.infeasibility.checks import check_task
 from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal

@@ -21,7 +21,7 @@ from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
-from kemba.ocp.continued import dear
+from kemba.ocp.finer import dear
 from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, spent

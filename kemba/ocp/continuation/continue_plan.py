@@ -23,8 +23,7 @@ from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.independent import ContradictionError
-from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining

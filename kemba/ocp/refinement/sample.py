@@ -5,7 +5,7 @@ import numpy as np
 
 from kemba.ocp.certificate.asked import measured
 from kemba.ocp.certificate.certify import Certificate, Violation, first_state, violations
-from kemba.ocp.phases.notes import phase_notes
+from kemba.ocp.phases.modes import phase_notes
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.transcription.layout import STEP
