@@ -128,7 +128,7 @@ PLANNING = [
     "refinement",
 ]
 PLANNING += ["continuation", "infeasibility", "planned", "planner", "finer"]
-PLANNING += ["planning", "starts"]
+PLANNING += ["planning"]
 
 
 def test_planning_is_built_from_the_bottom_up() -> None:

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from kemba.model.model import Model
-from kemba.model.node import Node
+from kemba.model.model import Model, Node
 from kemba.model.rest import Array, Buffered, Rest, rate_of
 
 

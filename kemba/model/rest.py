@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.model.model import Model
-from kemba.model.node import Node
+from kemba.model.model import Model, Node
 from kemba.quantity import Quantity
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -23,7 +23,7 @@ from kemba.errors import KembaError
 from kemba.machine_code import Native
 from kemba.mechanism import Mechanism
 from kemba.model import SUPPLY, Model
-from kemba.model.node import Node
+from kemba.model.model import Node
 from kemba.plant.kernel.machine import GAMMA, SPEED, SPIN, Array, KernelModel
 
 

@@ -24,8 +24,7 @@ from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import dear
 from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
-from kemba.ocp.planning import Planning, spent
-from kemba.ocp.starts import plan_best
+from kemba.ocp.planning import Planning, plan_best, spent
 from kemba.solve.trial import Trial, TrialOrder, executed
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory

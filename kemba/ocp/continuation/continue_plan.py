@@ -17,8 +17,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.ocp.certificate.objective import objective
 from kemba.ocp.continuation.origin import Origin, completed
-from kemba.ocp.controller import PERIOD
-from kemba.ocp.edges import ValveEdges, rounded
+from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
