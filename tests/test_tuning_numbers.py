@@ -57,10 +57,10 @@ CONSTANTS = {  # file -> names, why
     ),
     "plant/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/mpcc/solve.py": (
-        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL",
+        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL STEP "
+        "LONGEST",
         "figures of a general method, chosen on NOSBENCH (benchmarks/pages/nosbench.md)",
     ),
-    "ocp/mpcc/stationary.py": ("STEP LONGEST", "the same"),
     "ocp/nlp/ending.py": ("USUAL", "iterations of which a median is taken"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),

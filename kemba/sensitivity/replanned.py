@@ -34,7 +34,7 @@ from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhasePart, PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
-from kemba.ocp.refinement.solve import solve, warm
+from kemba.ocp.refinement.start import solve, warm
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import STEP

@@ -12,7 +12,7 @@ from kemba.ocp import load_task
 from kemba.ocp.functions.problem import violation
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
-from kemba.ocp.relaxation.lifting import confirm
+from kemba.ocp.relaxation.schedule import confirm
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.parameters import Parameters

@@ -29,8 +29,7 @@ from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.solve import solve, warm
-from kemba.ocp.refinement.start import on_elements
+from kemba.ocp.refinement.start import on_elements, solve, warm
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
