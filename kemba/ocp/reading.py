@@ -7,7 +7,7 @@ from kemba.config.parsing import sound
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import ConfigErrors, KembaError, listed_errors
 from kemba.model import Model, load_model
-from kemba.model.changes import changed_effects
+from kemba.model.spec import changed_effects
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task, parse_task

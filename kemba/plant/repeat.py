@@ -19,8 +19,7 @@ from kemba.effects.series import Series
 from kemba.errors import KembaError
 from kemba.mechanism import load_robot
 from kemba.model import Model, build_model, load_model, load_spec
-from kemba.model.changes import changed_effects
-from kemba.model.spec import ModelSpec, own_robot
+from kemba.model.spec import ModelSpec, changed_effects, own_robot
 from kemba.plant.certificate import PLANT
 from kemba.plant.commands import scattered
 from kemba.plant.controller import Execution, execute, read_controller

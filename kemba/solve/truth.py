@@ -12,8 +12,7 @@ from kemba.events import peak
 from kemba.files import sha256
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Evidence, Model, load_spec
-from kemba.model.changes import DRAWN, drawn_models
-from kemba.model.spec import evidence_folder
+from kemba.model.spec import DRAWN, drawn_models, evidence_folder
 from kemba.ocp import Plan, Task
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute_many

@@ -12,8 +12,8 @@ from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.effects.pneumatics.switching import pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
 from kemba.identify.bench.rig_model import Pulses
-from kemba.identify.logs.excerpt import held
 from kemba.identify.logs.limits import ROW
+from kemba.identify.logs.reading import held
 from kemba.identify.problem.noise import difference_sigma, telling
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags
