@@ -17,7 +17,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from block import table_of_tasks
 
 from kemba.ocp import load_task
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement.repair import FAILS
 

@@ -26,7 +26,7 @@ from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.schedule import find, interior
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
-from kemba.ocp.transcription.parameters import Parameters
+from kemba.ocp.transcription.transcribe import Parameters
 from kemba.settings import Settings, changed
 from kemba.sweep import expand, load_sweep, machine
 

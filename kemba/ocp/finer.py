@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
 
-from kemba.ocp.certificate.objective import costs, objective
+from kemba.ocp.certificate.certify import costs, objective
 from kemba.ocp.certificate.status import Status, missed_of, verdict
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
 from kemba.ocp.continuation.origin import Origin

@@ -10,8 +10,7 @@ import numpy as np
 
 from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
-from kemba.ocp.certificate.certify import Certificate, certify
-from kemba.ocp.certificate.objective import costs
+from kemba.ocp.certificate.certify import Certificate, certify, costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation

@@ -19,7 +19,7 @@ from kemba.config import Document
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import Judge, continued, found_and_refined, from_scratch, with_grip
@@ -29,10 +29,9 @@ from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
 from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
-from kemba.ocp.reading import asked_of
+from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
-from kemba.ocp.sequence import as_one, motions
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole

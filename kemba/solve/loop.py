@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import dear

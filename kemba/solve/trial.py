@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from kemba.errors import KembaError, enumerated
 from kemba.ocp import Plan, controller_table
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, lacking

@@ -8,7 +8,7 @@ import pytest
 from kemba.errors import KembaError
 from kemba.ocp import load_task
 from kemba.ocp.planning import check_feasible
-from kemba.ocp.sequence import joined, motions
+from kemba.ocp.reading import joined, motions
 from kemba.trajectory import Trajectory
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kemba.ocp import load_task
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram

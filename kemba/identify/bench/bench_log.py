@@ -9,9 +9,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.mechanics.piston import V_COULOMB
-from kemba.effects.pneumatics.switching import pulses
+from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
-from kemba.identify.bench.rig_model import Pulses
 from kemba.identify.logs.limits import ROW
 from kemba.identify.logs.reading import held
 from kemba.identify.problem.noise import difference_sigma, telling
@@ -19,6 +18,7 @@ from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
+Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 
 

@@ -11,7 +11,7 @@ from kemba.identify.problem.candidates import CompiledModels, nominal_figures, s
 from kemba.identify.problem.problem import Problem, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Rows, Theta
-from kemba.identify.rigs.candidates import standing_candidates
+from kemba.identify.rigs.problem import standing_candidates
 from kemba.model.along import StatesAlong
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory

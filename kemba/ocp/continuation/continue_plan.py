@@ -15,7 +15,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.continuation.origin import Origin, completed
 from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt

@@ -6,8 +6,7 @@ import numpy as np
 
 from kemba.ocp.nlp.ending import Stagnation
 from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate
-from kemba.ocp.phases.columns import Columns
-from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.program import Columns, PhaseProgram
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages

@@ -13,10 +13,9 @@ from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import WARM_PUSH, Bounds, Iterate, warm
 from kemba.ocp.relaxation.session import Attempt, Schedule
 from kemba.ocp.relaxation.settings import Ends, Grids, Relaxation, Starts
-from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.stage import COST_SCALE
-from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.transcription.transcribe import Parameters, Transcription
 from kemba.trajectory import Trajectory
 
 RELAX = "relax"  # the name of a schedule's first solve

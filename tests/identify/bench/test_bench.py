@@ -13,9 +13,8 @@ from kemba.effects.base import Effect
 from kemba.effects.pneumatics.switching import delayed, is_on, pulses
 from kemba.identify.adopt import adopt_effect
 from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.prediction import absolute_pressure
+from kemba.identify.bench.prediction import RigModel, absolute_pressure
 from kemba.identify.bench.problem import bench_problem
-from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.design.rig import propose
 from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings
 from kemba.identify.infer.linear import Linear, estimate, names_of, priors
