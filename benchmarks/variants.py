@@ -21,7 +21,7 @@ import numpy as np
 
 from kemba.config import parse
 from kemba.ocp import Task, load_task, plan
-from kemba.ocp.functions.proximal import Newton
+from kemba.ocp.functions.problem import Newton
 from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.schedule import find, interior
 from kemba.ocp.relaxation.session import Schedule

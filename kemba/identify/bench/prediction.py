@@ -13,16 +13,14 @@ import numpy as np
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.effects.series import Series
-from kemba.identify.bench.bench_log import PRESSURES, BenchLog, Pulses
+from kemba.identify.bench.bench_log import PRESSURES, BenchLog, Pulses, SmoothedMotion
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
-from kemba.identify.bench.motion import SmoothedMotion
 from kemba.identify.problem.candidates import CompiledModels, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.mechanism import Cylinder
-from kemba.model.along import StatesAlong
 from kemba.model.model import Model
-from kemba.model.rest import Buffered
+from kemba.model.rest import Buffered, StatesAlong
 
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight

@@ -11,8 +11,13 @@ from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.effects.pneumatics.switching import changes
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
-from kemba.identify.bench.bench_log import FRICTION, BenchLog, prepare
-from kemba.identify.bench.motion import SmoothedMotion, position_noise
+from kemba.identify.bench.bench_log import (
+    FRICTION,
+    BenchLog,
+    SmoothedMotion,
+    position_noise,
+    prepare,
+)
 from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, settle_starts, standardised
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.compare.force_profiles import lags, risen

@@ -12,8 +12,8 @@ from kemba.identify.problem.problem import Problem, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Rows, Theta
 from kemba.identify.rigs.problem import standing_candidates
-from kemba.model.along import StatesAlong
 from kemba.model.model import Model
+from kemba.model.rest import StatesAlong
 from kemba.trajectory import Trajectory
 
 STEPS = 2000  # steps over a log

@@ -13,9 +13,8 @@ from kemba.identify.problem.candidates import leg_by_leg, link_figures, nominal_
 from kemba.identify.problem.types import Array, Flags
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
-from kemba.model.along import midpoint_step
 from kemba.model.model import Model
-from kemba.model.rest import Rest, rate_of
+from kemba.model.rest import Rest, midpoint_step, rate_of
 from kemba.quantity import Quantity
 
 

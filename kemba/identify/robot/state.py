@@ -20,7 +20,7 @@ from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags, Theta
-from kemba.identify.robot.batch import Batch, ResampledLog
+from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole_rows
 from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
 from kemba.identify.robot.contact import ContactSchedule, loaded
 from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
@@ -35,7 +35,6 @@ from kemba.identify.robot.reference import (
     first_reference,
     read_schedules,
 )
-from kemba.identify.robot.sensing import ahead, sensed, whole_rows
 
 
 def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:

@@ -21,15 +21,14 @@ from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.phases.independent import ContradictionError
+from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
-from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.start import on_elements, solve, warm
+from kemba.ocp.refinement.start import certificate, on_elements, solve, to_trajectory, warm
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task

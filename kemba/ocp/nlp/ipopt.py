@@ -10,8 +10,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.ocp.functions.problem import Derivatives, Program, violation
-from kemba.ocp.functions.proximal import Proximal, regularised_hessian
+from kemba.ocp.functions.problem import (
+    Derivatives,
+    Program,
+    Proximal,
+    regularised_hessian,
+    violation,
+)
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.stopwatch import Stopwatch
 

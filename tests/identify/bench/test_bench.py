@@ -12,7 +12,7 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.pneumatics.switching import delayed, is_on, pulses
 from kemba.identify.adopt import adopt_effect
-from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.bench_log import SmoothedMotion
 from kemba.identify.bench.prediction import RigModel, absolute_pressure
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.design.rig import propose
