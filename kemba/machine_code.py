@@ -10,6 +10,7 @@ as with steps in time, it is written there.
 
 import struct
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -46,19 +47,10 @@ class Native:
     """
 
     def __init__(self, inputs: Sequence[ca.SX], functions: Mapping[str, Sequence[ca.SX]]) -> None:
-        import llvmlite.binding as llvm
-
-        llvm.initialize_native_target()
-        llvm.initialize_native_asmprinter()
         program = _Program()
         x = [ca.SX(ca.vertcat(*inputs))]
         bodies = [program.function(name, x, outputs) for name, outputs in functions.items()]
-        module = llvm.parse_assembly("\n".join([*program.declarations, *bodies]))
-        machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=1
-        )
-        self._engine = llvm.create_mcjit_compiler(module, machine)  # holds the code
-        self._engine.finalize_object()
+        self._engine = _compiled("\n".join([*program.declarations, *bodies]))  # holds the code
         self.address = {name: self._engine.get_function_address(name) for name in functions}
         self._loops = {
             name: self._engine.get_function_address(f"{name}.rows") for name in functions
@@ -88,6 +80,21 @@ class Native:
         call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         places = [array.ctypes.data for array in (x, *outputs, np.empty(0))[:3]]
         call(self.address[name])(*places)
+
+
+@lru_cache(maxsize=64)
+def _compiled(assembly: str) -> Any:
+    """LLVM's engine that holds the code. Models that differ in a figure share most functions."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    machine = llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=1
+    )
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(assembly), machine)
+    engine.finalize_object()
+    return engine
 
 
 class _Program:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Protocol
 
 import casadi as ca
@@ -209,6 +210,7 @@ class Effect(BaseModel):
         return f"{self.kind}:{self.on}" if self.on else self.kind
 
     @classmethod
+    @cache  # asked for at every prediction
     def declared(cls) -> dict[str, Param]:
         """Scalar parameters of the kind by field name."""
         found = {}

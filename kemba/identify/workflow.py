@@ -34,18 +34,13 @@ PLANT = "plant"  # the shipped simulated robot, with physical chambers
 AROUND = 0.01  # s before and after a reading from which a speed is told
 
 
-def noise_ratio(problem: Problem, figures: Mapping[str, float] | None = None) -> float:
-    """Error of the model as it is, in units of the noise: `noise_ratio` of `compare`.
-
-    `figures`: of the machine, as `Evidence.figures`; without them all are nominal.
-    """
-    return error_ratio(
-        with_learnt_colour(problem, free_starts(problem)), _figures_felt(problem, figures or {})
-    )
+def _with_noise(problem: Problem) -> Problem:
+    """The problem with the noise of its logs, as `compare` learns it."""
+    return with_learnt_colour(problem, free_starts(problem))
 
 
 def _figures_felt(problem: Problem, figures: Mapping[str, float]) -> dict[str, float]:
-    """Those figures of a machine that these logs can feel."""
+    """Those figures of a machine that these logs can feel; the others are nominal."""
     return {name: value for name, value in figures.items() if name in problem.nuisance}
 
 
@@ -131,9 +126,9 @@ def discover_logs(
         found = discover(problem, judge, _searching(time_limit, time.monotonic() - started), say)
         answer = found.answer
         say("comparing what is written with the quoted logs")
-        _quote(answer, judge or problem, kept or fitted, model)
+        quoted = _quote(answer, judge or problem, kept or fitted, model)
         answer.remarks = [*answer.remarks, *remarks]
-        answer.evidence = _evidence(answer, fitted, kept, model)
+        answer.evidence = _evidence(answer, quoted, fitted, kept, model)
     except BadData as error:
         answer = Answer("bad-data", sentence=sentence(error.errors))
         answer.remarks = [str(e) for e in error.errors]
@@ -167,12 +162,13 @@ def _kept_aside(
     return list(fitted), list(kept), [] if kept else [f"the quoted error is {few}"]
 
 
-def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: str) -> None:
+def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: str) -> Problem:
     """Tell the errors on quoted logs as `compare` does, of the model as it is (`judge`), and of
-    the one that is written; what does not predict better there is not written."""
+    the one that is written; what does not predict better there is not written. Returns the logs
+    under the better one, with their noise."""
     before = answer.error_before, answer.error_after
-    evidence = load_spec(model).evidence
-    stated = noise_ratio(judge, evidence.figures if evidence else {})
+    evidence, judge = load_spec(model).evidence, _with_noise(judge)
+    stated = error_ratio(judge, _figures_felt(judge, evidence.figures if evidence else {}))
     answer.error_before = answer.error_after = stated
     if answer.writes:
         with tempfile.TemporaryDirectory() as folder:
@@ -180,16 +176,25 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
             file = Path(folder) / "model.yaml"
             write_model(file, model, data["ranking"], answer.added, data)
             written = make_problem(excerpts(logs)[0], model_of(logs, str(file)))
-        answer.error_after = noise_ratio(written, answer.machine)
+        written = _with_noise(written)
+        answer.error_after = error_ratio(written, _figures_felt(written, answer.machine))
         if answer.error_after > answer.error_before:
             answer.drop_model()
+        else:
+            judge = written
     answer.rescaled_from(before)
+    return judge
 
 
 def _evidence(
-    answer: Answer, fitted: Sequence[Trajectory], kept: Sequence[Trajectory], model: str
+    answer: Answer,
+    judge: Problem,
+    fitted: Sequence[Trajectory],
+    kept: Sequence[Trajectory],
+    model: str,
 ) -> dict[str, Any] | None:
-    """What the model that is written rests on, as its YAML says it; None where none is written."""
+    """What the model that is written rests on, as its YAML says it; None where none is written.
+    `judge`: the quoted logs under it."""
     if not answer.writes:
         return None
     used = [*((log, "learnt") for log in fitted), *((log, "quoted") for log in kept)]
@@ -197,7 +202,9 @@ def _evidence(
     quoted, plant = kept or fitted, None
     if quoted[0].meta["kind"] == "robot":
         simulated = plant_of(model, scene_in(quoted[0].meta))
-        plant = noise_ratio(make_problem(excerpts(quoted)[0], simulated))
+        # one noise for both, or the model that takes more of its error for noise would look better
+        other = make_problem(excerpts(quoted)[0], simulated).with_noise_of(judge)
+        plant = error_ratio(other, {})
     return {
         "logs": [{"file": str(p), "sha256": sha256(p), "use": use} for p, use in paths],
         "error_before": answer.error_before,
@@ -324,7 +331,7 @@ def compare_read(
     tell("finding the motion in the logs")
     problem, _ = admitted(read, built)
     tell("learning the noise of the sensors")
-    problem = with_learnt_colour(problem, free_starts(problem))
+    problem = _with_noise(problem)
     tell("comparing with the model")
     evidence = load_spec(model).evidence
     figures = _figures_felt(problem, evidence.figures) if evidence else {}

@@ -68,10 +68,11 @@ class Evidence(Section):
 
     `error_before`, `error_held_out`: `noise_ratio` of `compare` on the quoted logs, of the model as
     it was and of this one; `error_plant`: of the shipped simulated robot with physical chambers on
-    these logs, where it can be had. `covariance`: a CSV file beside the model, see
-    `read_covariance`. `figures`: nominal figures of single legs and links of this machine, as its
-    logs tell them: factors of what the model states (`chamber:rear.fill[0]`), shares by which a
-    link is off (`tolerance.front/knee.mass`). Predictions of its logs use them, plans do not.
+    these logs, where it can be had, with the noise learnt beside this one. `covariance`: a CSV file
+    beside the model, see `read_covariance`. `figures`: nominal figures of single legs and links of
+    this machine, as its logs tell them: factors of what the model states (`chamber:rear.fill[0]`),
+    shares by which a link is off (`tolerance.front/knee.mass`). Predictions of its logs use them,
+    plans do not.
     """
 
     logs: tuple[EvidenceLog, ...] = ()

@@ -101,8 +101,8 @@ class SensorFaults:
 
 def is_fault(name: str) -> bool:
     """Whether a name in theta is a figure that changes what some sensor shows."""
-    kind = name.partition(":")[0]
-    return kind in _fault_kinds() or kind.partition(".")[0] in _carriers()
+    found = BY_KIND.get(name.partition(":")[0].partition(".")[0])
+    return found is not None and found.readings is not Effect.readings
 
 
 def moves_readings(name: str) -> bool:
@@ -114,5 +114,6 @@ def moves_readings(name: str) -> bool:
 def is_straight(name: str) -> bool:
     """Whether a name in theta is a sensor fault's figure in which the reading is linear."""
     kind, _, rest = name.partition(":")
-    cls = _fault_kinds().get(kind)
-    return cls is not None and cls.straight and rest.rpartition(".")[2] in cls.off
+    found = BY_KIND.get(kind)
+    fault = found if found and issubclass(found, SensorEffect) else None
+    return fault is not None and fault.straight and rest.rpartition(".")[2] in fault.off

@@ -10,7 +10,8 @@ import casadi as ca
 import numpy as np
 
 from kemba.identify.problem.candidates import leg_by_leg, link_figures, nominal_figures
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.types import Array, Flags, Theta
+from kemba.identify.robot.candidates import without_delay
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
@@ -150,7 +151,23 @@ class Physics:
         self.grip = grip
         self._maps: dict[str, SampleMap] = {}
         self._needed: dict[tuple[int, ...], Index] = {}
+        self._place = {name: i for i, name in enumerate(self.names)}
+        pairs = zip(self.names, self.nominal, strict=True)
+        self._usual = np.array([without_delay(name, value) for name, value in pairs])
         self._knees: dict[tuple[int, bytes], tuple[Array, Array]] = {}
+
+    def at(self, theta: Theta) -> Array:
+        """Free parameters (k,) at theta, within their bounds."""
+        p = self._usual.copy()
+        for name, value in theta.items():
+            if (i := self._place.get(name)) is not None:
+                p[i] = without_delay(name, value)
+        return np.asarray(np.clip(p, *self.bounds))
+
+    def timing(self, theta: Theta) -> Array:
+        """Delays (valves, 2) [s] to switching on and off at theta."""
+        late = [self.base.timing(leg, theta) for leg in self.legs]
+        return np.repeat(late, 2, axis=0)  # both valves of a leg
 
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
         """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate

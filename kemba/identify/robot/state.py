@@ -21,7 +21,7 @@ from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.problem.types import Array, Flags, Theta
 from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole_rows
-from kemba.identify.robot.candidates import GRIP, SOFTNESS, without_delay
+from kemba.identify.robot.candidates import GRIP, SOFTNESS
 from kemba.identify.robot.contact import ContactSchedule, loaded
 from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
 from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
@@ -231,7 +231,7 @@ class LinearisedState:
     @cached_property
     def _at_base(self) -> Array:
         """Free parameters (k,) where the model was linearised."""
-        return _values_at(self.physics, self.base)[0]
+        return self.physics.at(self.base)
 
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
@@ -247,7 +247,7 @@ class LinearisedState:
     def seen(self, theta: Theta) -> tuple[Array, Array]:
         """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
         of a robot with the lengths at theta."""
-        p, _ = _values_at(self.physics, theta)
+        p = self.physics.at(theta)
         at = self._at_base
         own = self.physics.lengths
         if np.array_equal(p[own], at[own]):
@@ -263,7 +263,7 @@ class LinearisedState:
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
-        force = self.forces.at(*_values_at(self.physics, theta))
+        force = self.forces.at(self.physics.at(theta), self.physics.timing(theta))
         beside = [theta.get(name, nominal) - nominal for name, (_, nominal) in self.linear.items()]
         return self.motion.defect(force + self._columns @ beside if any(beside) else force)
 
@@ -274,8 +274,11 @@ class LinearisedState:
 
     def slopes(self, theta: Theta, names: Sequence[str]) -> Iterator[Array]:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
-        slopes = self.forces.slopes(*_values_at(self.physics, theta)) if names else np.empty(0)
-        place = {n: i for i, n in enumerate(self.physics.names)}
+        if not names:
+            return
+        physics = self.physics
+        slopes = self.forces.slopes(physics.at(theta), physics.timing(theta))
+        place = {n: i for i, n in enumerate(physics.names)}
         for part in at_once(len(names)):
             forces = (
                 self.linear[n][0] if n in self.linear else self.batch.deep(slopes[:, :, place[n]])
@@ -343,7 +346,7 @@ def linearise_at(
     `unknown`: density of the forces that no model explains; `noise` of the sensors; `first`: the
     motion smoothed without the model's forces, where it is known.
     """
-    p = _values_at(physics, base)[0]
+    p = physics.at(base)
     dt = float(np.median(batch.h[batch.valid]))
     late = np.array([sensors.lateness(base, channel) for channel in physics.channels])
     rows = whole_rows(late, dt)
@@ -385,7 +388,7 @@ def _along(
     noise: Noise,
 ) -> LinearisedState:
     """The model at `base` linearised along one reference."""
-    p, delays = _values_at(physics, base)
+    p, delays = physics.at(base), physics.timing(base)
     states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
     density = densities(physics, batch, schedules, unknown)
     motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
@@ -396,16 +399,6 @@ def _along(
     return LinearisedState(
         physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces, noise
     )
-
-
-def _values_at(physics: Physics, theta: Theta) -> tuple[Array, Array]:
-    """Free parameters (k,) in the order of `physics.names`, and delays (valves, 2) [s] to switching
-    on and off, at theta."""
-    names = zip(physics.names, physics.nominal, strict=True)
-    p = np.array([without_delay(n, theta.get(n, value)) for n, value in names])
-    p = np.clip(p, *physics.bounds)
-    late = [physics.base.timing(leg, theta) for leg in physics.legs]
-    return p, np.repeat(late, 2, axis=0)  # both valves of a leg
 
 
 def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
