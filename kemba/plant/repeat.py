@@ -72,6 +72,14 @@ def lacking(model: str, plant: str) -> list[str]:
     return [e.name for e in load_spec(plant).effects if e.name not in known]
 
 
+def carried_over(model: str, payload: float = 0.0) -> list[str]:
+    """What the plant has because the planning model has it, beyond the shipped one: effects that
+    were learnt or added, found lengths, and the task's `payload` [kg]."""
+    plain = {e.name for e in load_spec(PLAIN).effects}
+    added = [e.name for e in load_spec(model).effects if e.moves and e.name not in plain]
+    return [*added, *([f"payload {payload:g} kg"] if payload else [])]
+
+
 def another_robot(model: str, plant: str) -> str | None:
     """The name of the robot that the file of `plant` names, where it is not that of `model`."""
     named = own_robot(plant)

@@ -11,7 +11,7 @@ from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
-from kemba.plant.repeat import another_robot, lacking
+from kemba.plant.repeat import another_robot, carried_over, lacking
 from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
 from kemba.solve.judged import Judged, judged
@@ -144,6 +144,8 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     if without:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
+    if alike := carried_over(task.model, task.payload):
+        names.append(f"the plant has {enumerated(alike)}, too")
     facts = {"verdict_on": done.truth.on, "band": done.band.json() if done.band else None}
     if done.good:
         return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}

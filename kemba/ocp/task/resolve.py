@@ -263,7 +263,7 @@ def timing_errors(task: Task, document: Document) -> list[KembaError]:
         f"min_dwell: {task.min_dwell:g} s is not less than the motion's {task.duration:g} s, so "
         "that no valve could open and close again"
     )
-    return [document.error(("min_dwell",), what, hint="give less, such as 0.01 s")]
+    return [document.error(("min_dwell",), what, hint=f"give less than {task.duration:g} s")]
 
 
 def _fault(name: str, value: Any) -> tuple[str, str] | None:
