@@ -63,6 +63,17 @@ class Linear:
         return self.names.index(name)
 
 
+def precision_factor(gram: Array, width: Array) -> Array:
+    """Lower Cholesky factor (k, k) of the posterior's precision in prior widths, W J'J W + 1.
+
+    Where many rows tell columns apart that are nearly alike, rounding of J'J (k, k) exceeds the 1
+    that the prior gives; so much is added.
+    """
+    scaled = gram * np.outer(width, width)
+    rounding = len(width) * np.finfo(float).eps * scaled.diagonal().max(initial=0.0)
+    return np.asarray(np.linalg.cholesky(scaled + (1.0 + rounding) * np.eye(len(width))))
+
+
 def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
     """Nuisance, every switch, and the shapes of the effects that are on."""
     shapes = [
