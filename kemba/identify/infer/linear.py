@@ -66,12 +66,15 @@ class Linear:
 def precision_factor(gram: Array, width: Array) -> Array:
     """Lower Cholesky factor (k, k) of the posterior's precision in prior widths, W J'J W + 1.
 
-    Where many rows tell columns apart that are nearly alike, rounding of J'J (k, k) exceeds the 1
-    that the prior gives; so much is added.
+    Where strong columns are nearly alike, J'J (k, k) is rounded by more than the 1 that the prior
+    gives; so much is added then.
     """
-    scaled = gram * np.outer(width, width)
-    rounding = len(width) * np.finfo(float).eps * scaled.diagonal().max(initial=0.0)
-    return np.asarray(np.linalg.cholesky(scaled + (1.0 + rounding) * np.eye(len(width))))
+    scaled = gram * np.outer(width, width) + np.eye(len(width))
+    try:
+        return np.asarray(np.linalg.cholesky(scaled))
+    except np.linalg.LinAlgError:
+        rounding = len(width) * np.finfo(float).eps * scaled.diagonal().max()
+        return np.asarray(np.linalg.cholesky(scaled + rounding * np.eye(len(width))))
 
 
 def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
