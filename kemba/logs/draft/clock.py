@@ -160,7 +160,7 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
 
 def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:
     """The score of a rising column by its name, and why; None where it is something else."""
-    said = words(named_unit(names.labels.get(name, name))[0])
+    said = words(names.bare(name))
     if name == "__time":
         return PLOTTER, "'__time' is the clock that PlotJuggler puts before all topics"
     if says_time(name):

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.logs.draft.words import Meaning, Names, named_unit, unknown
+from kemba.logs.draft.words import Meaning, Names, unknown, without_sensors
 from kemba.quantity import convert
 from kemba.trajectory import Array
 
@@ -189,13 +189,18 @@ def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target
     columns = list(values)
     scores = np.full((len(targets), len(columns)), NOTHING)
     for j, name in enumerate(columns):
-        strangers = min(unknown(named_unit(names.labels.get(name, name))[0], names.legs), 3)
+        bare, unit = names.bare(name), names.unit(name)
+        plain = without_sensors(bare)
+        strangers = min(unknown(plain, names.legs) + (plain != bare), 3)
+        whole, short = names.says(name), names.says(name, sensors=False)
         for i, target in enumerate(targets):
-            unit = names.unit(name)
             if name in names.switches and not target.is_valve:
                 continue
             if fits(target, unit, values[name]):
-                score = agreement(by_unit(names.says(name), target, unit), target)
+                score = agreement(by_unit(whole, target, unit), target)
+                other = agreement(by_unit(short, target, unit), target)
+                if NOTHING < score < other + UNRELATED:  # what is left says as much
+                    score = other
                 scores[i, j] = score - STRANGER * strangers if score > NOTHING else NOTHING
     scores[scores < ENOUGH] = NOTHING
     total, best = _best(scores)
@@ -274,7 +279,7 @@ def agreement(says: Meaning, target: Target) -> float:
         if group in target.may:
             if target.may[group] not in found:
                 return NOTHING
-            score += SAID_TOO
+            score += SAID_TOO * (target.may[group] != "position")
         elif group not in target.means:
             score -= UNRELATED * (group in ("kind", "leg", "part"))
     if "desired" in says.get("role", ()) and not target.is_valve:
