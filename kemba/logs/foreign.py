@@ -45,7 +45,9 @@ def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
         found[header] = values
     if slower:
         said.append(times.merged(slower, float(np.median(np.diff(time)))))
-    return Trajectory(time, found, {**raw.meta, **({"read": said} if said else {})})
+    kept = [h.split(" [")[0] for h, s in layout.columns.items() if s.unwrap is False]
+    meta = {"read": said, "kept": kept}
+    return Trajectory(time, found, {**raw.meta, **{k: v for k, v in meta.items() if v}})
 
 
 def unwrapped(values: Array) -> Array:

@@ -10,7 +10,7 @@ from strange_logs import judged, way, written
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
-from kemba.logs import load_map
+from kemba.logs import ColumnMap, load_map
 from kemba.logs.draft.draft import draft_map
 from kemba.logs.times import seconds
 from kemba.trajectory import Trajectory
@@ -131,6 +131,11 @@ def test_wrapped_angles_are_joined_and_said(tmp_path: Path) -> None:
         tmp_path / "other.csv", (), None, "drive", {"axis/q": "rad", "axis/tau": "N.m"}
     )
     assert draft.columns["axis/q [rad]"]["unwrap"] is True
+    for unwrap, angle in ((None, q), (True, q), (False, turned)):
+        columns = {h: {**s, "unwrap": unwrap} for h, s in draft.columns.items()}
+        read = read_log(tmp_path / "other.csv", ColumnMap(kind="drive", columns=columns))
+        assert np.ptp(read["axis/q"] - angle) == pytest.approx(0.0, abs=1e-9)
+        assert ("begins anew" in str(read.meta.get("read"))) is (unwrap is not False)
 
 
 def test_the_pitch_of_a_quaternion(tmp_path: Path) -> None:

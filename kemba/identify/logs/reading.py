@@ -174,8 +174,12 @@ def _with_torques(log: Trajectory) -> Trajectory:
 
 
 def _turned(log: Trajectory) -> Trajectory:
-    """The log with angles that begin anew after each turn joined, and said so."""
-    angles = [n for n in log.names if log.unit(n) == "rad" and not n.endswith("/v")]
+    """The log with angles that begin anew after each turn joined, and said so; those that a map
+    leaves as they are (`log.meta["kept"]`) stay so."""
+    kept = log.meta.pop("kept", ())
+    angles = [
+        n for n in log.names if log.unit(n) == "rad" and not n.endswith("/v") and n not in kept
+    ]
     found = {f"{name} [rad]": unwrapped(log[name]) for name in angles if wraps(log[name])}
     if not found:
         return log
