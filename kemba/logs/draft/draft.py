@@ -179,7 +179,7 @@ def draft_map(
     labels = {} if trial.header else joint_state_labels(raw.columns)
     below = zip(raw.columns, units_below(path, layout), strict=False)
     stated = {**_spelt(below), **_spelt(raw.units.items())}
-    names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns))
+    names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns), raw.angles)
     values = numbers(raw.columns, trial.decimal)
     stamp = stamp_of(raw.columns, values, names)
     if stamp is None:

@@ -50,13 +50,15 @@ def guessed_units(
     """
     kinds: dict[tuple[str, str], list[str]] = {}
     stated: dict[str, set[str]] = {}
+    found: dict[str, str] = {}
     for header, name in pairs.items():
         unit = names.unit(name)
+        if unit is None and names.angles and header.endswith("[rad]"):
+            unit = found[header] = names.angles
         if unit is not None:
             stated.setdefault(_sensors(header), set()).add(unit)
         elif not header.endswith("[1]"):
             kinds.setdefault((_kind(header), _sensors(header)), []).append(header)
-    found: dict[str, str] = {}
     told: dict[str, str] = {}
     asked: list[str] = []
     for (kind, sensors), own in sorted(kinds.items(), key=lambda k: not _size(k[0][0], stroke)[1]):

@@ -91,13 +91,14 @@ Meaning = dict[str, set[str]]
 @dataclass(frozen=True)
 class Names:
     """The names of a log's columns: the machine's legs, what headerless columns are called, units
-    that the file states apart, and columns that say `on` and `off`."""
+    that the file states apart, columns that say `on` and `off`, and the unit of all angles."""
 
     legs: Sequence[str] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     below: Mapping[str, str] = field(default_factory=dict)
     switches: Collection[str] = ()
     columns: Collection[str] = ()
+    angles: str = ""
 
     def unit(self, name: str) -> str | None:
         """The unit that a column's name tells, else the one that the file states."""
