@@ -61,6 +61,10 @@ def test_a_stray_quote_is_told_at_its_line(where: str, tmp_path: Path) -> None:
         (["-1 days +23:59:59.700000", "0 days 00:00:00.100000"], 0.4),
         (["20261231T100000.5", "20261231T100001.25"], 0.75),
         (["10:00:00:500", "10:00:01:250"], 0.75),
+        (["0.1 s", "0.25 s"], 0.15),
+        (["100ms", "2e2ms"], 0.1),
+        (["PT0.1S", "PT1M0.2S"], 60.1),
+        (["1h 59 min 59.5 s", "2 h"], 0.5),
     ],
 )
 def test_times_in_words(texts: list[str], expected: float) -> None:
@@ -69,7 +73,7 @@ def test_times_in_words(texts: list[str], expected: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "texts", [["a:b", "c:d"], ["10:00:00+01:00", "10:00:01+02:00"], ["1", "2"]]
+    "texts", [["a:b", "c:d"], ["10:00:00+01:00", "10:00:01+02:00"], ["1", "2"], ["1 V", "2 V"]]
 )
 def test_what_is_no_time_in_words(texts: list[str]) -> None:
     assert seconds(np.array(texts, dtype=object)) is None
@@ -115,6 +119,31 @@ def test_what_names_leave_open_is_asked(name: str, words: str, tmp_path: Path) -
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
     draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
     assert any(words in question for question in draft.questions), draft.questions
+
+
+@pytest.mark.parametrize(
+    ("name", "ticks", "every", "asked"),
+    [
+        ("time", 1e4, 1, True),  # 0.1 ms
+        ("time", 1e7, 1, True),  # 100 ns
+        ("sample", 1e3, 1, True),
+        ("", 500, 2, True),
+        ("time", 1 / 60, 1, True),  # min
+        ("time", 1e3, 1, False),
+        ("time", 1e6, 2, False),
+        ("time", 1.0, 10, False),
+    ],
+)
+def test_ticks_that_names_do_not_tell_are_asked(
+    name: str, ticks: float, every: int, asked: bool, tmp_path: Path
+) -> None:
+    """The step between rows tells a unit only where the rate is a usual one in it."""
+    log = robot_log(800).rows(slice(None, None, every))
+    time = log.time * ticks if ticks <= 1 else np.round(log.time * ticks).astype(int)
+    table = {name: time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    assert any("ms apart" in question for question in draft.questions) is asked
 
 
 def test_wrapped_angles_are_joined_and_said(tmp_path: Path) -> None:
