@@ -12,7 +12,7 @@ from kemba.config import load_yaml
 from kemba.errors import KembaError, map_hint, suggest
 from kemba.logs import times
 from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
-from kemba.logs.formats import READERS, reader
+from kemba.logs.formats import READERS, UNREAD, check_read, reader
 from kemba.logs.recording import Column, Raw, Recording
 from kemba.logs.text import as_numbers, first_row, read_text
 from kemba.quantity import convert
@@ -210,7 +210,7 @@ def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat")
 BINARY = tuple(f".{ending}" for ending in READERS)
-ENDINGS = (*TEXTS, *BINARY)
+ENDINGS = (*TEXTS, *BINARY, *(f".{ending}" for ending in " ".join(UNREAD).split()))
 YAML = (".yaml", ".yml")
 LONGEST = 200  # characters of another program's message
 
@@ -241,6 +241,7 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
     first fault, and where foreign columns need a map.
     """
     if not path.is_dir() and path.suffix.lower() not in (*BINARY, *YAML) and columns is None:
+        check_read(path)
         return Trajectory.read(path, strict)
     raw = raw_columns(path, columns)
     raw = replace(raw, meta={**raw.meta, **_sidecar(path)})
@@ -256,7 +257,7 @@ def is_recorded(path: Path) -> bool:
 
 
 def is_log_file(path: Path) -> bool:
-    """Whether a path is that of a log by its ending, or the folder of a recording."""
+    """Whether a path is that of a log by its ending, be it read or not, or of a recording."""
     return is_recorded(path) if path.is_dir() else path.suffix.lower() in ENDINGS
 
 
@@ -265,8 +266,9 @@ def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
     if not path.is_file() and not is_recorded(path):
         raise KembaError(str(path), "is a folder" if path.is_dir() else "no such file")
     if path.suffix.lower() in YAML:
-        endings = ", ".join(ENDINGS)
+        endings = ", ".join((*TEXTS, *BINARY))
         raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
+    check_read(path)
     if path.is_dir() or path.suffix.lower() in BINARY:
         return _binary(path)
     if layout is None:

@@ -145,7 +145,9 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log = _turned(one_clock(open_log(path, columns, strict=False)))
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     if log.meta["kind"] == "plan":
-        hint = f"logs of it come from the robot, or from: kemba-opt simulate {path.parent}"
+        here = (path.parent / "manifest.json").is_file()
+        run = path.parent if here else log.meta.get("run", "RUN")
+        hint = f"logs of it come from the robot, or from: kemba-opt simulate {run}"
         raise KembaError(str(path), "is a plan, not a log", hint=hint)
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
