@@ -6,7 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from foreign_files import robot_log
+from strange_logs import PLAIN, UNITS, noisy
 
+from kemba.identify.logs.reading import read_log
+from kemba.logs import load_map
 from kemba.logs.draft.draft import Draft, draft_map
 
 DEGREES = np.degrees(1)
@@ -77,3 +80,26 @@ def test_pressures_in_megapascals(tmp_path: Path) -> None:
     pd.DataFrame({"time": log.time, **table}).to_csv(tmp_path / "log.csv", index=False)
     draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
     assert units(draft)["front/chamber/extend/P"] == "MPa"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_columns_with_units_and_without_are_read_right_or_asked_about(
+    seed: int, tmp_path: Path
+) -> None:
+    """Each column in a unit drawn at random, which its header tells or not."""
+    rng = np.random.default_rng(seed)
+    log = noisy(rng)
+    table = {"time": log.time}
+    for name in log.names:
+        unit, size = (ways := UNITS.get(log.unit(name), [("", 1.0)]))[rng.integers(len(ways))]
+        told = unit and rng.random() < 0.5
+        plain = PLAIN.get(log.unit(name), [("", 1.0)])[-1 if rng.random() < 0.3 else 0][1]
+        label = name.replace("/", "_") + (f" [{unit}]" if told else "")
+        table[label] = log[name] * (size if told else plain)
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    (tmp_path / "map.yaml").write_text(draft.text("log.csv"))
+    back = read_log(tmp_path / "log.csv", load_map(tmp_path / "map.yaml"))
+    for name in log.names:
+        if not any(name in question for question in draft.questions):
+            assert back[name] == pytest.approx(log[name], abs=5e-3), name
