@@ -38,6 +38,7 @@ def units(draft: Draft) -> dict[str, str]:
         ("body_z", "body_z [mm/10]", 1e4, "mm/10", "body/x"),
         ("front_hip_q", "front_hip_q [mrad]", 1e3, "mrad", "body/pitch"),
         ("front_hip_tau", "front_hip_tau [mN.m]", 1e3, "mN.m", ""),
+        ("front_hip_tau", "front_hip_tau [Nm]", 1.0, "Nm", ""),
         ("body_pitch", "body_pitch_deg", DEGREES, "deg", ""),
         ("front_piston_x", "front_piston_x [mm]", 1e3, "mm", ""),
         ("rear_hip_tau", "rear_hip_tau", 1e3, "", "hip/tau"),

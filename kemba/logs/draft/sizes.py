@@ -64,7 +64,7 @@ def guessed_units(
     for (kind, sensors), own in sorted(kinds.items(), key=lambda k: not _size(k[0][0], stroke)[1]):
         usual, ours = _size(kind, stroke), own[0][own[0].index("[") + 1 : -1]
         sizes = [float(np.nanmax(np.abs(values[pairs[h]]), initial=0.0)) for h in own]
-        others = sorted(stated.get(sensors, set()) - {ours})
+        others = sorted(u for u in stated.get(sensors, ()) if convert(1.0, u, ours) != 1.0)
         if usual[1] > 0.0:
             each = [_fitting(size, ours, [*UNITS[ours], *others], usual) for size in sizes]
             fitting = each[int(np.argmax(sizes))]
