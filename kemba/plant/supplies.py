@@ -48,8 +48,10 @@ def tell_supplies(logs: Mapping[str, Trajectory], supplies: Sequence[float]) -> 
 
 
 def _level(log: Trajectory) -> float:
-    """The pressure [Pa] at which open chambers settle, the lower one of two, since a rod that moves
-    presses on the other; 0 where none is logged."""
+    """The pressure [Pa] of the supply if it is logged, else that at which open chambers settle, the
+    lower one of two, since a rod that moves presses on the other; 0 where none is logged."""
+    if "supply/P" in log:
+        return float(np.nanmedian(log["supply/P"]))
     found = []
     for valve in VALVES:
         name, on = f"chamber/{valve}/P", log[f"valve/{valve}"] > 0.5
