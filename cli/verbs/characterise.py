@@ -69,9 +69,9 @@ def characterise(
             raise typer.BadParameter(what, param_hint="--supply" if supply else "--figure")
         _own_rig(logs, model, out, force, json, quiet, column_map)
         return
+    from kemba.identify.published import as_json
     from kemba.logs import load_map, log_files, open_log
     from kemba.plant.characterise import characterise as fit
-    from kemba.plant.tables import as_json
     from kemba.quantity import to_si
     from kemba_cli.next_steps import after_model, say_next
 
@@ -189,7 +189,7 @@ def _draw(
 def _print(found: Characteristics) -> None:
     from rich.table import Table
 
-    from kemba.plant import tables
+    from kemba.identify import published as tables
 
     for title, columns, rows in (
         ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),

@@ -33,9 +33,15 @@ from kemba.identify.problem.types import (
 )
 from kemba.identify.robot.batch import Batch, resample
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.forces import formula_columns, robot_force_channels, robot_missing
+from kemba.identify.robot.forces import (
+    changes,
+    describe,
+    formula_columns,
+    robot_force_channels,
+    robot_missing,
+    robot_operating_point,
+)
 from kemba.identify.robot.geometry import remarks, standing_lengths
-from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.noise import (
     Noise,
     expected_power,
@@ -45,13 +51,13 @@ from kemba.identify.robot.noise import (
 )
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
-from kemba.identify.robot.rows import changes, describe, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
 from kemba.identify.robot.validate import (
-    BETTER,
-    HINT,
+    BY_MAP,
+    LESS,
     contradictions,
     is_absurd,
+    mixed_up,
     turned_pitch,
     turned_torques,
     valve_mix_ups,
@@ -295,10 +301,10 @@ class RobotProblem(Problem):
                 found.append((float(np.sqrt(np.mean(left**2))), text))
         before = float(np.sqrt(np.mean(r**2)))
         after, text = min(found, default=(before, ""))
-        if after > before / BETTER:
+        if after > before / LESS:
             return []
         what = f"the logs err by {before:.1f} times their noise, and by {after:.1f} times then"
-        return [KembaError(", ".join(self.runs), text, what, HINT)]
+        return [KembaError(", ".join(self.runs), text, what, BY_MAP)]
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""

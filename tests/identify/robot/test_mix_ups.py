@@ -10,8 +10,8 @@ import pytest
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array
 from kemba.identify.robot.batch import ResampledLog
-from kemba.identify.robot.mix_ups import mix_ups, mixed_up
 from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.validate import mix_ups, mixed_up
 from kemba.model.spec import load_model
 
 Change = Callable[[Array], Array]
