@@ -57,6 +57,7 @@ def as_json(found: Characteristics) -> dict[str, Any]:
         "rise_r2": found.rises.r2 if found.rises else None,
         "bilinear_r2": found.rises.r2_linear if found.rises else None,
         "check": {name: {"r2": r2, "rms_n": rms} for name, (r2, rms) in found.check.items()},
+        "remarks": list(found.remarks),
     }
 
 

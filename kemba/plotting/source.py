@@ -28,7 +28,7 @@ from kemba.events import (
     read,
     runs,
 )
-from kemba.logs import ColumnMap, open_log
+from kemba.logs import ColumnMap, is_log_file, open_log
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.quantity import to_si
@@ -88,8 +88,8 @@ def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
     Raises KembaError.
     """
     path = Path(path)
-    file = path / PLAN_FILE if path.is_dir() else path
-    if not file.is_file():
+    file = path / PLAN_FILE if path.is_dir() and not is_log_file(path) else path
+    if not file.exists():
         what = f"has no {PLAN_FILE}" if path.is_dir() else "no such file or folder"
         runs = ", ".join(str(found.parent) for found in sorted(Path("runs").glob(f"*/{PLAN_FILE}")))
         expected = "a run folder or a log was expected"

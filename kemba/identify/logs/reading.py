@@ -148,7 +148,9 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
     log = _turned(one_clock(open_log(path, columns, strict=False)))
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     if log.meta["kind"] == "plan":
-        hint = f"logs of it come from the robot, or from: kemba-opt simulate {path.parent}"
+        here = (path.parent / "manifest.json").is_file()
+        run = path.parent if here else log.meta.get("run", "RUN")
+        hint = f"logs of it come from the robot, or from: kemba-opt simulate {run}"
         raise KembaError(str(path), "is a plan, not a log", hint=hint)
     log.meta["name"] = path.stem
     log.meta["path"] = str(path)
@@ -177,8 +179,12 @@ def _with_torques(log: Trajectory) -> Trajectory:
 
 
 def _turned(log: Trajectory) -> Trajectory:
-    """The log with angles that begin anew after each turn joined, and said so."""
-    angles = [n for n in log.names if log.unit(n) == "rad" and not n.endswith("/v")]
+    """The log with angles that begin anew after each turn joined, and said so; those that a map
+    leaves as they are (`log.meta["kept"]`) stay so."""
+    kept = log.meta.pop("kept", ())
+    angles = [
+        n for n in log.names if log.unit(n) == "rad" and not n.endswith("/v") and n not in kept
+    ]
     found = {f"{name} [rad]": unwrapped(log[name]) for name in angles if wraps(log[name])}
     if not found:
         return log
