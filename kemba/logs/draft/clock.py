@@ -161,7 +161,7 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
         step = float(np.median(np.diff(seconds)))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
-        if score == COUNTER or not (first <= step <= last or _since_1970(rows, unit)):
+        if not (first <= step <= last or _since_1970(rows, unit)):
             question = (
                 f"are the rows {1e3 * step:.3g} ms apart? '{name}' has no unit: taken as {unit}"
             )
