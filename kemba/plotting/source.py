@@ -201,14 +201,18 @@ class Machine:
         return np.asarray(height < ON_GROUND)
 
     def course(self, motion: Trajectory) -> ContactCourse:
-        """Its contacts and flights. Exact motions are read as they are judged; feet of measured
-        ones stand by force and height, and come down where their height bends."""
+        """Its contacts and flights: of an exact motion as it is judged, else as `measured`."""
         legs, kind = self.mechanism.legs, motion.meta.get("kind")
         if kind in (None, *EXACT) and all(f"{leg}/foot/z" in motion for leg in legs):
             reading = EXECUTED if kind == "simulation" else PLANNED
             return read(motion, reading, self.mechanism.weight)
+        return self.measured(motion)
+
+    def measured(self, motion: Trajectory) -> ContactCourse:
+        """The contacts and flights of a motion, exact or not, as a log tells them: feet stand by
+        force and height, and come down where their height bends."""
         found: dict[str, list[Span]] = {}
-        for leg in legs:
+        for leg in self.mechanism.legs:
             spans = contacts(motion.time, np.where(self.stance(motion, leg), 0.0, 1.0), PLANNED)
             height = self.height(motion, leg)
             if height is not None:

@@ -32,8 +32,8 @@ class FlownJump:
 
 def flight_of(motion: Trajectory, machine: Machine) -> FlownJump:
     """The highest flight of a motion with body/z, body/pitch and every leg's hip and piston (or
-    knee)."""
-    course = machine.course(motion)
+    knee). Logs and simulations are read alike, so that their differences are those of the robot."""
+    course = machine.measured(motion)
     if not np.isfinite(course.landing):
         return FlownJump(course.top[1], np.nan, np.nan)
     pitch = motion.get("body/pitch", np.zeros(len(motion)))
