@@ -2,77 +2,92 @@
 
 While the ground carries the robot, its lowest foot is on the ground and stands still, and each
 foot does so for a part of the time. Where the measured motion says otherwise, each usual mistake,
-and each pair of them, is put right in turn; the simplest after which the feet stand within
-millimetres is named, with what is the same to the feet of a robot that is its own mirror image.
-Only the geometry of the robot as it is drawn is used, no forces and no fitted lengths.
+and each pair of them, is put right in turn: a sign, a unit, a swap, a zero that is then fitted. The
+simplest after which the feet stand within millimetres is named, with all that leave as little. What
+moves the feet by millimetres only is an effect, and no mistake; other lengths of the legs are one
+more hypothesis, which never counts where a mistake explains as much.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
+from scipy.optimize import minimize_scalar
 
+from kemba.effects.pneumatics.switching import Pulse
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.types import Array, Theta
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.physics import Physics
 
-Columns = Mapping[str, Array]
-Change = Callable[[Columns], dict[str, Array]]
+Columns = Mapping[str, Any]  # readings (n,), or the pulses of a valve
+Change = Callable[[Columns], dict[str, Any]]
 OTHER_ZERO = "body/z counts from another zero"
 HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
 CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
-WINDOW = 0.05  # time in which a standing foot does not move [s]
+WINDOW = 0.1  # time in which a standing foot does not move [s]
+SMOOTH = 0.02  # time over which readings are smoothed [s]
 ROW = 0.005  # distance of the rows that are looked at [s]
 FEWEST = 10  # rows on the ground from which feet can be judged
-# typical error of a standing foot that no mix-up would leave [m]: a late encoder moves a foot
-# by 9 mm
+STILL = 2.5e-3  # error of a standing foot that sensors make which are right [m]
+# error of a standing foot that sensors make, and distance by which a mistake must move a foot, or
+# it is an effect [m]: a late encoder moves one by 9 mm
 SMALL = 0.012
-BETTER = 4.0  # factor by which a mix-up must make the feet stand better
+BETTER = 2.5  # factor by which a mix-up must make the feet stand better
 # height by which the zero of body/z must be off where other lengths make feet stand, too [m]
 ZERO = 0.05
 ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told
+NEAR_ANGLE, NEAR_PISTON = 0.4, 0.02  # how far from its start a zero is looked for [rad], [m]
 
 
 @dataclass(frozen=True)
 class MixUp:
-    """One mistake in words, what it is a mistake `about`, and the columns put right."""
+    """One mistake in words, what it is a mistake `about`, and the columns put right.
+
+    `at`: where it is that of a zero, the mistake for a zero that is so much more, up to `reach`.
+    """
 
     text: str
     about: frozenset[str]
     change: Change
+    at: Callable[[float], MixUp] | None = None
+    reach: float = 0.0
 
 
-def mixed_up(physics: Physics, log: ResampledLog, lengths: bool = False) -> Iterator[KembaError]:
+def mixed_up(
+    physics: Physics, log: ResampledLog, lengths: Theta | None = None
+) -> Iterator[KembaError]:
     """The mistake in the columns of a log, or two of them, if its feet stand much better without.
 
-    `lengths`: other lengths of the legs make feet stand as well; then one mistake must do, for two
-    say no more than a length does.
+    `lengths` of the legs at which feet stand as well; then one mistake must do, for two say no more
+    than a length does, and it must leave as little.
     """
     feet = _Feet(physics, log)
-    feet.least = ZERO if lengths else 0.0
-    most = 1 if lengths else 2
+    feet.least = ZERO if lengths else SMALL
     error = feet.restless([])
-    if error is None or error < SMALL:
+    if error is None or error < STILL:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
     goal = min(SMALL, error / BETTER)
-    for count in range(1, most + 1):
+    if lengths:
+        goal = min(goal, ALIKE * (feet.restless([], lengths) or goal))
+    for count in range(1, 2 if lengths or error < SMALL else 3):
         trials = []
         for some in combinations(known, count):
             if count == 2 and some[0].about & some[1].about:
                 continue
+            some = (feet.fitted(some[0]),) if count == 1 else some
             left = feet.restless(some)
-            if left is not None:
+            if left is not None and left < goal and feet.moved(some) > SMALL:
                 trials.append((left, some))
-        fitting = [(e, some) for e, some in trials if e < goal]
-        if fitting:
-            yield _said(log.name, error, feet, fitting)
+        if trials:
+            yield _said(log.name, error, feet, trials)
             return
 
 
@@ -80,19 +95,23 @@ def _said(
     name: str, error: float, feet: _Feet, fitting: Sequence[tuple[float, Sequence[MixUp]]]
 ) -> KembaError:
     """The best hypothesis, and others that the feet cannot tell from it."""
-    best = min(e for e, _ in fitting)
+    fitting = sorted(fitting, key=lambda trial: trial[0])
+    best = fitting[0][0]
     close = [some for e, some in fitting if e <= ALIKE * best]
     texts = [" and ".join(m.text for m in some) for some in close]
-    offset = next(
-        (f for some in close[:1] for m in some if (f := feet.offset(some, m)) is not None), None
-    )
-    if offset is not None:
-        texts[0] += f" ({1e3 * offset:+.0f} mm too much)"
+    if any(m.text == OTHER_ZERO for m in close[0]):
+        texts[0] += f" ({_number(feet.offset(close[0]), 'm')} too much)"
     several = f"{'; or '.join(texts)}" + (
         " (feet cannot tell these apart)" if len(texts) > 1 else ""
     )
     what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {several}"
     return KembaError(name, what, f"corrected, it is {1e3 * best:.0f} mm", HINT)
+
+
+def _number(value: float, unit: str) -> str:
+    """A zero [rad or m] in words."""
+    shown, word = (1e3 * value, "mm") if unit == "m" else (np.degrees(value), "degrees")
+    return f"{shown:+.{0 if abs(shown) >= 10 else 1}f} {word}"
 
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
@@ -101,51 +120,91 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
         "body/pitch has the reversed sign (nose up is positive)", ["body/pitch"], np.negative
     )
     yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
+    yield _zero("body/pitch counts from another zero", ["body/pitch"])
     yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
     yield MixUp(OTHER_ZERO, frozenset({"body/z"}), _nothing)
     yield _each("body/z counts downwards", ["body/z"], np.negative)
-    yield MixUp(
-        "body/x and body/z are swapped",
-        frozenset({"body/x", "body/z"}),
-        _exchange(("body/x", "body/z")),
-    )
-    groups = [("every leg", list(legs)), *((f"the {leg} leg", [leg]) for leg in legs)]
-    for whose, some in groups if len(legs) > 1 else groups[1:]:
+    yield _swap("body/x and body/z are swapped", ("body/x", "body/z"))
+    for whose, some in _groups(legs):
         hips, pistons = ([f"{leg}/{x}" for leg in some] for x in ("hip/q", "piston/x"))
         yield _each(f"hip/q of {whose} has the reversed sign", hips, np.negative)
-        for degrees in (90, -90, 180):
-            yield _each(
-                f"hip/q of {whose} counts from another zero ({degrees:+d} degrees too much)",
-                hips,
-                partial(np.add, -np.radians(degrees)),
-            )
-            yield _each(
-                f"hip/q of {whose} has the reversed sign and another zero ({degrees:+d} degrees)",
-                hips,
-                partial(np.subtract, np.radians(degrees)),
-            )
-        yield _each(
-            f"piston/x of {whose} counts from the extended end",
-            pistons,
-            partial(np.subtract, stroke),
-        )
+        yield _zero(f"hip/q of {whose} counts from another zero", hips)
+        for start in np.radians((90, -90, 180)):
+            yield _zero(f"hip/q of {whose} counts from another zero", hips, 1.0, start)
+            text = f"hip/q of {whose} has the reversed sign and another zero"
+            yield _zero(text, hips, -1.0, -start)
+        text = f"piston/x of {whose} counts from the extended end"
+        yield _each(text, pistons, lambda x: stroke - x)
+        yield _zero(f"piston/x of {whose} counts from another zero", pistons)
     if len(legs) == 2:
         pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in ("hip/q", "piston/x")]
-        both = frozenset(name for pair in pairs for name in pair)
-        yield MixUp("the legs are swapped", both, _exchange(*pairs))
+        for x, pair in zip(("hip/q", "piston/x"), pairs, strict=True):
+            yield _swap(f"{x} of the legs is swapped", pair)
+        yield _swap("the legs are swapped", *pairs)
         yield MixUp(
             "body/x and body/pitch have the reversed sign and the legs are swapped (the robot is "
             "seen from its other side)",
-            both | {"body/x", "body/pitch"},
+            frozenset({name for pair in pairs for name in pair} | {"body/x", "body/pitch"}),
             _mirrored(pairs),
         )
 
 
-def _each(text: str, names: Sequence[str], change: Callable[[Array], Array]) -> MixUp:
+def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
+    """The same about commands; those of valves are pulses."""
+    sides = ("extend", "retract")
+    for whose, some in _groups(legs):
+        hips = [f"{leg}/hip/tau" for leg in some]
+        pairs = [(f"{leg}/valve/extend", f"{leg}/valve/retract") for leg in some]
+        valves = [name for pair in pairs for name in pair]
+        yield _each(f"hip/tau of {whose} has the reversed sign", hips, np.negative)
+        both = "valve/extend and valve/retract are"
+        yield _swap(f"{both} swapped at {whose}", *pairs)
+        yield _each(f"{both} inverted (1 is on) at {whose}", valves, _inverted)
+        for side in sides:
+            one = [f"{leg}/valve/{side}" for leg in some]
+            yield _each(f"valve/{side} is inverted (1 is on) at {whose}", one, _inverted)
+    if len(legs) == 2:
+        crossed = {x: (f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in
+                   ("hip/tau", *(f"valve/{side}" for side in sides))}  # fmt: skip
+        for x, pair in crossed.items():
+            yield _swap(f"{x} of the legs is swapped", pair)
+        yield _swap("the valves of the legs are swapped", *list(crossed.values())[1:])
+        yield _swap("the commands of the legs are swapped", *crossed.values())
+
+
+def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Every leg, and each."""
+    every = [("every leg", list(legs))] if len(legs) > 1 else []
+    return [*every, *((f"the {leg} leg", [leg]) for leg in legs)]
+
+
+def _inverted(sent: Sequence[Pulse]) -> list[Pulse]:
+    """Pulses of a valve that is on where it was off."""
+    edges = [-np.inf, *(t for pulse in sent for t in pulse), np.inf]
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if a < b]
+
+
+def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixUp:
     return MixUp(text, frozenset(names), lambda y: {name: change(y[name]) for name in names})
 
 
-def _nothing(y: Columns) -> dict[str, Array]:
+def _zero(text: str, names: Sequence[str], sign: float = 1.0, start: float = 0.0) -> MixUp:
+    """A zero (and a sign): what is true is sign * reading - zero."""
+    unit, reach = ("m", NEAR_PISTON) if names[0].endswith("/x") else ("rad", NEAR_ANGLE)
+
+    def at(more: float) -> MixUp:
+        zero = start + more
+        said = f"{text} ({_number(sign * zero, unit)} too much)"
+        return MixUp(said, frozenset(names), lambda y: {n: sign * y[n] - zero for n in names})
+
+    return replace(at(0.0), at=at, reach=reach)
+
+
+def _swap(text: str, *pairs: tuple[str, str]) -> MixUp:
+    return MixUp(text, frozenset(name for pair in pairs for name in pair), _exchange(*pairs))
+
+
+def _nothing(y: Columns) -> dict[str, Any]:
     """The zero of the height is found by where the lowest foot is."""
     return {}
 
@@ -168,29 +227,32 @@ class _Feet:
     """Feet of a log as its columns say, with mistakes put right."""
 
     def __init__(self, physics: Physics, log: ResampledLog) -> None:
-        self.physics, self.log = physics, log
-        self.least = 0.0  # zero of body/z that is a mistake, at least [m]
+        self.physics = physics
+        self.least = SMALL  # zero of body/z that is a mistake, at least [m]
         self.step = float(np.median(np.diff(log.time)))
         self.half = max(1, round(0.5 * WINDOW / self.step))
         good = np.isfinite(log.y)
         self.enough = bool(np.all(good.sum(axis=0) > FEWEST))
         self.enough &= len(log.time) > 4 * self.half
+        smooth = max(1, round(0.5 * SMOOTH / self.step))
         self.y = {
-            name: np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i])
+            name: local_fit(
+                np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i]), smooth, self.step, 2
+            )
             for i, name in enumerate(physics.channels)
-            if good[:, i].any()
+            if self.enough
         }
 
-    def restless(self, some: Sequence[MixUp]) -> float | None:
-        """How far [m] feet are from the ground and from their place one window before.
+    def restless(self, some: Sequence[MixUp], lengths: Theta | None = None) -> float | None:
+        """How far [m] feet are from the ground, and come within a window.
 
-        The lowest foot stands in most of the rows on the ground, and each foot in a quarter of them
-        at least: the largest of these quantiles. None where too few rows tell it, or where a zero
-        of the height is no mistake.
+        The lowest foot stands in most of the rows in which the ground carries the robot, and each
+        foot in a quarter of them at least: the largest of these quantiles. None where too few rows
+        tell it, or where a zero of the height is no mistake.
         """
         if not self.enough:
             return None
-        places, rows = self._places(some)
+        places, rows = self._places(some, lengths)
         if len(rows) < FEWEST:
             return None
         before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
@@ -205,12 +267,31 @@ class _Feet:
             height = height - zero
         far = np.hypot(height, np.linalg.norm(after - before, axis=2))
         nearest = np.take_along_axis(far, lowest, axis=1)
-        return float(max(np.median(nearest), np.quantile(far, 0.25, axis=0).max()))
+        return float(max(np.quantile(nearest, 0.75), np.quantile(far, 0.25, axis=0).max()))
 
-    def offset(self, some: Sequence[MixUp], mistake: MixUp) -> float | None:
+    def fitted(self, mistake: MixUp) -> MixUp:
+        """A mistake about a zero, with that after which feet stand best; any other as it is."""
+        at = mistake.at
+        if at is None:
+            return mistake
+        found = minimize_scalar(
+            lambda more: self.restless([at(more)]) or np.inf,
+            bounds=(-mistake.reach, mistake.reach),
+            method="bounded",
+            options={"xatol": 1e-3 * mistake.reach},
+        )
+        return at(float(found.x))
+
+    def moved(self, some: Sequence[MixUp]) -> float:
+        """How far [m] it moves the feet to put these mistakes right."""
+        if _rezeroed(some):
+            return np.inf  # the zero itself was judged
+        places, rows = self._places(some)
+        away = np.linalg.norm(places[rows] - self._places([])[0][rows], axis=2)
+        return float(np.nanquantile(away, 0.9, axis=0).max())
+
+    def offset(self, some: Sequence[MixUp]) -> float:
         """By how much [m] the height reads too much, where its zero is the mistake."""
-        if mistake.text != OTHER_ZERO:
-            return None
         places, rows = self._places(some)
         return float(np.median(places[rows, :, 1].min(axis=1)))
 
@@ -220,15 +301,18 @@ class _Feet:
             y |= mistake.change(y)
         return y
 
-    def _places(self, some: Sequence[MixUp]) -> tuple[Array, np.ndarray]:
-        """Places (n, legs, 2) of the feet [m], and the rows at which the ground carries the robot,
-        half a window from the ends at least."""
+    def _places(
+        self, some: Sequence[MixUp], lengths: Theta | None = None
+    ) -> tuple[Array, np.ndarray]:
+        """Places (n, legs, 2) of the feet [m], and the rows around which the ground carries the
+        robot for a window."""
         half, y = self.half, self._changed(some)
         columns = np.stack([y[name] for name in self.physics.channels], axis=1)
-        fall = local_fit(columns[:, 1], half, self.step, 2, 2)
+        fall = local_fit(columns[:, 1], max(1, half // 2), self.step, 2, 2)
+        carried = minimum_filter1d((fall > -CARRIED).astype(int), 2 * half + 1)
         rows = np.arange(half, len(columns) - half, max(1, round(ROW / self.step)))
-        rows = rows[fall[rows] > -CARRIED]
-        count, p = len(self.physics.legs), self.physics.nominal
+        rows = rows[carried[rows] > 0]
+        count, p = len(self.physics.legs), self.physics.at(lengths or {})
         wanted = np.unique(np.concatenate([rows - half, rows, rows + half]))
         known = columns[wanted]
         q = np.hstack([known[:, : 3 + count], self.physics.knees(known[:, 3 + count :], p)])
