@@ -28,7 +28,6 @@ from kemba.identify.robot.physics import Physics
 
 Columns = Mapping[str, Any]  # readings (n,), or the pulses of a valve
 Change = Callable[[Columns], dict[str, Any]]
-OTHER_ZERO = "body/z counts from another zero"
 HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
 CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
 WINDOW = 0.1  # time in which a standing foot does not move [s]
@@ -40,17 +39,19 @@ STILL = 2.5e-3  # error of a standing foot that sensors make which are right [m]
 # it is an effect [m]: a late encoder moves one by 9 mm
 SMALL = 0.012
 BETTER = 2.5  # factor by which a mix-up must make the feet stand better
-# height by which the zero of body/z must be off where other lengths make feet stand, too [m]
-ZERO = 0.05
-ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told
-NEAR_ANGLE, NEAR_PISTON = 0.4, 0.02  # how far from its start a zero is looked for [rad], [m]
+ZERO = 0.05  # the latter where other lengths of the legs make feet stand, too [m]
+ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told by feet
+SAME = 1.1  # the same by what the model leaves
+QUARTER = np.pi / 2  # turns by which hips are mounted wrongly [rad]
+REACH = {"hip/q": QUARTER / 2, "piston/x": 0.02, "body/pitch": 0.4}  # of a zero, from its start
 
 
 @dataclass(frozen=True)
 class MixUp:
     """One mistake in words, what it is a mistake `about`, and the columns put right.
 
-    `at`: where it is that of a zero, the mistake for a zero that is so much more, up to `reach`.
+    `at`: where it is that of a zero, the same for a zero that is so much more, up to `reach`; it is
+    where the lowest foot is on the ground if that is infinite.
     """
 
     text: str
@@ -60,21 +61,27 @@ class MixUp:
     reach: float = 0.0
 
 
+Some = Sequence[MixUp]
+
+
 def mixed_up(
-    physics: Physics, log: ResampledLog, lengths: Theta | None = None
+    physics: Physics,
+    log: ResampledLog,
+    lengths: Theta | None = None,
+    left: Callable[[ResampledLog], float] = lambda log: 1.0,
 ) -> Iterator[KembaError]:
     """The mistake in the columns of a log, or two of them, if its feet stand much better without.
 
     `lengths` of the legs at which feet stand as well; then one mistake must do, for two say no more
-    than a length does, and it must leave as little.
+    than a length does, and it must leave as little. `left`: what the model leaves of a log; it
+    tells what feet cannot.
     """
     feet = _Feet(physics, log)
-    feet.least = ZERO if lengths else SMALL
     error = feet.restless([])
     if error is None or error < STILL:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
-    goal = min(SMALL, error / BETTER)
+    goal, least = min(SMALL, error / BETTER), ZERO if lengths else SMALL
     if lengths:
         goal = min(goal, ALIKE * (feet.restless([], lengths) or goal))
     for count in range(1, 2 if lengths or error < SMALL else 3):
@@ -82,30 +89,48 @@ def mixed_up(
         for some in combinations(known, count):
             if count == 2 and some[0].about & some[1].about:
                 continue
-            some = (feet.fitted(some[0]),) if count == 1 else some
-            left = feet.restless(some)
-            if left is not None and left < goal and feet.moved(some) > SMALL:
-                trials.append((left, some))
+            some = feet.fitted(some)
+            after = feet.restless(some)
+            far = least if any(m.about == {"body/z"} for m in some) else SMALL
+            if after is not None and after < goal and feet.moved(some) > far:
+                trials.append((after, some))
         if trials:
-            yield _said(log.name, error, feet, trials)
+            best = min(after for after, _ in trials)
+            close = [some for after, some in trials if after <= ALIKE * best]
+            if len(close) > 1:
+                rest = [left(corrected(log, physics, some)) for some in close]
+                close = [s for s, e in zip(close, rest, strict=True) if e <= SAME * min(rest)]
+            texts = [" and ".join(m.text for m in some) for some in close]
+            several = " (feet cannot tell these apart)" if len(texts) > 1 else ""
+            what = f"a foot is {1e3 * error:.0f} mm from where it should stand"
+            said = f"{what}: {'; or '.join(texts)}{several}"
+            yield KembaError(log.name, said, f"corrected, it is {1e3 * best:.0f} mm", HINT)
             return
 
 
-def _said(
-    name: str, error: float, feet: _Feet, fitting: Sequence[tuple[float, Sequence[MixUp]]]
-) -> KembaError:
-    """The best hypothesis, and others that the feet cannot tell from it."""
-    fitting = sorted(fitting, key=lambda trial: trial[0])
-    best = fitting[0][0]
-    close = [some for e, some in fitting if e <= ALIKE * best]
-    texts = [" and ".join(m.text for m in some) for some in close]
-    if any(m.text == OTHER_ZERO for m in close[0]):
-        texts[0] += f" ({_number(feet.offset(close[0]), 'm')} too much)"
-    several = f"{'; or '.join(texts)}" + (
-        " (feet cannot tell these apart)" if len(texts) > 1 else ""
+def corrected(log: ResampledLog, physics: Physics, some: Some) -> ResampledLog:
+    """A log with mistakes put right, and the noise of what its columns then are."""
+    legs, channels = physics.legs, physics.channels
+    hips = [f"{leg}/hip/tau" for leg in legs]
+    valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
+    commands = [*zip(hips, log.torque.T, strict=True), *zip(valves, log.sent, strict=True)]
+    y, noisy = (
+        _changed({**dict(zip(channels, z.T, strict=True)), **dict(commands)}, some)
+        for z in (log.y, log.y + log.sigma)
     )
-    what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {several}"
-    return KembaError(name, what, f"corrected, it is {1e3 * best:.0f} mm", HINT)
+    read, above, torque = (
+        np.stack([x[name] for name in names], axis=1)
+        for x, names in ((y, channels), (noisy, channels), (y, hips))
+    )
+    sigma, sent = np.nanmedian(np.abs(above - read), axis=0), tuple(y[name] for name in valves)
+    return replace(log, y=read, torque=torque, sent=sent, sigma=sigma)
+
+
+def _changed(y: Columns, some: Some) -> dict[str, Any]:
+    y = dict(y)
+    for mistake in some:
+        y |= mistake.change(y)
+    return y
 
 
 def _number(value: float, unit: str) -> str:
@@ -116,20 +141,22 @@ def _number(value: float, unit: str) -> str:
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
     """Mistakes of one kind each, and how to put each right."""
-    yield _each(
-        "body/pitch has the reversed sign (nose up is positive)", ["body/pitch"], np.negative
-    )
+    yield from slight(legs)
     yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
     yield _zero("body/pitch counts from another zero", ["body/pitch"])
     yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
-    yield MixUp(OTHER_ZERO, frozenset({"body/z"}), _nothing)
-    yield _each("body/z counts downwards", ["body/z"], np.negative)
+    yield _zero("body/z counts from another zero", ["body/z"])
+    yield _zero("body/z counts downwards from a zero", ["body/z"], -1.0)
     yield _swap("body/x and body/z are swapped", ("body/x", "body/z"))
     for whose, some in _groups(legs):
-        hips, pistons = ([f"{leg}/{x}" for leg in some] for x in ("hip/q", "piston/x"))
+        hips, torques, pistons = (
+            [f"{leg}/{x}" for leg in some] for x in ("hip/q", "hip/tau", "piston/x")
+        )
         yield _each(f"hip/q of {whose} has the reversed sign", hips, np.negative)
+        text = f"hip/q and hip/tau of {whose} have the reversed sign"
+        yield _each(text, [*hips, *torques], np.negative)
         yield _zero(f"hip/q of {whose} counts from another zero", hips)
-        for start in np.radians((90, -90, 180)):
+        for start in (QUARTER, -QUARTER, 2 * QUARTER):
             yield _zero(f"hip/q of {whose} counts from another zero", hips, 1.0, start)
             text = f"hip/q of {whose} has the reversed sign and another zero"
             yield _zero(text, hips, -1.0, -start)
@@ -137,15 +164,28 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
         yield _each(text, pistons, lambda x: stroke - x)
         yield _zero(f"piston/x of {whose} counts from another zero", pistons)
     if len(legs) == 2:
-        pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in ("hip/q", "piston/x")]
-        for x, pair in zip(("hip/q", "piston/x"), pairs, strict=True):
-            yield _swap(f"{x} of the legs is swapped", pair)
+        columns = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
+        pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in columns]
+        yield _swap("hip/q of the legs is swapped", pairs[0])
         yield _swap("the legs are swapped", *pairs)
-        yield MixUp(
+        text = (
             "body/x and body/pitch have the reversed sign and the legs are swapped (the robot is "
-            "seen from its other side)",
-            frozenset({name for pair in pairs for name in pair} | {"body/x", "body/pitch"}),
-            _mirrored(pairs),
+            "seen from its other side)"
+        )
+        turned = _each(text, ["body/x", "body/pitch"], np.negative)
+        swap = _swap(text, *pairs)
+        both = turned.about | swap.about
+        yield MixUp(text, both, lambda y: {**swap.change(y), **turned.change(y)})
+
+
+def slight(legs: Sequence[str]) -> Iterator[MixUp]:
+    """Those of them that move feet by millimetres only in a motion that is even and upright."""
+    yield _each(
+        "body/pitch has the reversed sign (nose up is positive)", ["body/pitch"], np.negative
+    )
+    if len(legs) == 2:
+        yield _swap(
+            "piston/x of the legs is swapped", (f"{legs[0]}/piston/x", f"{legs[1]}/piston/x")
         )
 
 
@@ -185,42 +225,26 @@ def _inverted(sent: Sequence[Pulse]) -> list[Pulse]:
 
 
 def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixUp:
-    return MixUp(text, frozenset(names), lambda y: {name: change(y[name]) for name in names})
+    return MixUp(text, frozenset(names), lambda y: {n: change(y[n]) for n in names if n in y})
 
 
 def _zero(text: str, names: Sequence[str], sign: float = 1.0, start: float = 0.0) -> MixUp:
     """A zero (and a sign): what is true is sign * reading - zero."""
-    unit, reach = ("m", NEAR_PISTON) if names[0].endswith("/x") else ("rad", NEAR_ANGLE)
+    reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
+    unit = "rad" if names[0].endswith(("/q", "/pitch")) else "m"
 
     def at(more: float) -> MixUp:
         zero = start + more
         said = f"{text} ({_number(sign * zero, unit)} too much)"
-        return MixUp(said, frozenset(names), lambda y: {n: sign * y[n] - zero for n in names})
+        return _each(said, names, lambda x: sign * x - zero)
 
     return replace(at(0.0), at=at, reach=reach)
 
 
 def _swap(text: str, *pairs: tuple[str, str]) -> MixUp:
-    return MixUp(text, frozenset(name for pair in pairs for name in pair), _exchange(*pairs))
-
-
-def _nothing(y: Columns) -> dict[str, Any]:
-    """The zero of the height is found by where the lowest foot is."""
-    return {}
-
-
-def _exchange(*pairs: tuple[str, str]) -> Change:
-    return lambda y: {a: y[b] for pair in pairs for a, b in (pair, pair[::-1])}
-
-
-def _mirrored(pairs: Sequence[tuple[str, str]]) -> Change:
-    turned = ("body/x", "body/pitch")
-    return lambda y: {**_exchange(*pairs)(y), **{name: np.negative(y[name]) for name in turned}}
-
-
-def _rezeroed(some: Sequence[MixUp]) -> bool:
-    """Whether the zero of the height is to be found: where the lowest foot is."""
-    return any(m.text.startswith("body/z counts") for m in some)
+    both = [ends for pair in pairs for ends in (pair, pair[::-1])]
+    about = frozenset(name for pair in pairs for name in pair)
+    return MixUp(text, about, lambda y: {a: y[b] for a, b in both if b in y})
 
 
 class _Feet:
@@ -228,7 +252,6 @@ class _Feet:
 
     def __init__(self, physics: Physics, log: ResampledLog) -> None:
         self.physics = physics
-        self.least = SMALL  # zero of body/z that is a mistake, at least [m]
         self.step = float(np.median(np.diff(log.time)))
         self.half = max(1, round(0.5 * WINDOW / self.step))
         good = np.isfinite(log.y)
@@ -237,76 +260,65 @@ class _Feet:
         smooth = max(1, round(0.5 * SMOOTH / self.step))
         self.y = {
             name: local_fit(
-                np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i]), smooth, self.step, 2
+                np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i]),
+                smooth,
+                self.step,
+                2,
             )
             for i, name in enumerate(physics.channels)
             if self.enough
         }
 
-    def restless(self, some: Sequence[MixUp], lengths: Theta | None = None) -> float | None:
+    def restless(self, some: Some, lengths: Theta | None = None) -> float | None:
         """How far [m] feet are from the ground, and come within a window.
 
         The lowest foot stands in most of the rows in which the ground carries the robot, and each
         foot in a quarter of them at least: the largest of these quantiles. None where too few rows
-        tell it, or where a zero of the height is no mistake.
+        tell it.
         """
         if not self.enough:
             return None
         places, rows = self._places(some, lengths)
-        if len(rows) < FEWEST:
-            return None
+        if len(rows) < FEWEST or np.median(_changed(self.y, some)["body/z"]) < 0.0:
+            return None  # the latter: the body is under the ground
         before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
+        far = np.hypot(now[:, :, 1], np.linalg.norm(after - before, axis=2))
         lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
-        height = now[:, :, 1]
-        if some and np.median(self._changed(some)["body/z"]) < 0.0 and not _rezeroed(some):
-            return None  # the body is under the ground
-        if _rezeroed(some):
-            zero = float(np.median(np.take_along_axis(height, lowest, axis=1)))
-            if abs(zero) < self.least and any(m.text == OTHER_ZERO for m in some):
-                return None
-            height = height - zero
-        far = np.hypot(height, np.linalg.norm(after - before, axis=2))
         nearest = np.take_along_axis(far, lowest, axis=1)
         return float(max(np.quantile(nearest, 0.75), np.quantile(far, 0.25, axis=0).max()))
 
-    def fitted(self, mistake: MixUp) -> MixUp:
-        """A mistake about a zero, with that after which feet stand best; any other as it is."""
-        at = mistake.at
-        if at is None:
-            return mistake
-        found = minimize_scalar(
-            lambda more: self.restless([at(more)]) or np.inf,
-            bounds=(-mistake.reach, mistake.reach),
-            method="bounded",
-            options={"xatol": 1e-3 * mistake.reach},
-        )
-        return at(float(found.x))
+    def fitted(self, some: Some) -> Some:
+        """Mistakes about zeros, each with that after which feet stand best; of two mistakes only
+        that of the height is fitted."""
+        found = list(some)
+        for i, mistake in enumerate(some):
+            at = mistake.at
+            if at is None or (len(some) > 1 and np.isfinite(mistake.reach)):
+                continue
+            if np.isfinite(mistake.reach):
+                reach = (-mistake.reach, mistake.reach)
+                best = minimize_scalar(
+                    lambda more, at=at: self.restless([at(more)]) or np.inf,
+                    bounds=reach,
+                    method="bounded",
+                )
+                found[i] = at(float(best.x))
+            else:
+                places, rows = self._places(some)
+                lowest = places[rows, :, 1].min(axis=1)
+                found[i] = at(float(np.median(lowest)) if len(rows) else 0.0)
+        return found
 
-    def moved(self, some: Sequence[MixUp]) -> float:
+    def moved(self, some: Some) -> float:
         """How far [m] it moves the feet to put these mistakes right."""
-        if _rezeroed(some):
-            return np.inf  # the zero itself was judged
-        places, rows = self._places(some)
-        away = np.linalg.norm(places[rows] - self._places([])[0][rows], axis=2)
+        (places, rows), (as_read, _) = self._places(some), self._places([])
+        away = np.linalg.norm(places[rows] - as_read[rows], axis=2)
         return float(np.nanquantile(away, 0.9, axis=0).max())
 
-    def offset(self, some: Sequence[MixUp]) -> float:
-        """By how much [m] the height reads too much, where its zero is the mistake."""
-        places, rows = self._places(some)
-        return float(np.median(places[rows, :, 1].min(axis=1)))
-
-    def _changed(self, some: Sequence[MixUp]) -> dict[str, Array]:
-        y = dict(self.y)
-        for mistake in some:
-            y |= mistake.change(y)
-        return y
-
-    def _places(
-        self, some: Sequence[MixUp], lengths: Theta | None = None
-    ) -> tuple[Array, np.ndarray]:
+    def _places(self, some: Some, lengths: Theta | None = None) -> tuple[Array, np.ndarray]:
         """Places (n, legs, 2) of the feet [m], and the rows around which the ground carries the
         robot for a window."""
-        half, y = self.half, self._changed(some)
+        half, y = self.half, _changed(self.y, some)
         columns = np.stack([y[name] for name in self.physics.channels], axis=1)
         fall = local_fit(columns[:, 1], max(1, half // 2), self.step, 2, 2)
         carried = minimum_filter1d((fall > -CARRIED).astype(int), 2 * half + 1)

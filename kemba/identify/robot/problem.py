@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
-from kemba.identify.robot.batch import Batch, resample
+from kemba.identify.robot.batch import Batch, ResampledLog, resample
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
 from kemba.identify.robot.forces import formula_columns, robot_force_channels, robot_missing
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
@@ -47,7 +47,7 @@ from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
 from kemba.identify.robot.rows import changes, describe, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
-from kemba.identify.robot.validate import contradictions, mixed_commands
+from kemba.identify.robot.validate import contradictions, mixed_commands, rms, slightly_mixed_up
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -99,7 +99,11 @@ class RobotProblem(Problem):
         reference = first_reference(physics, batch, physics.nominal)
         self.standing = standing_lengths(physics, batch, reference, self.candidates)
         legs = self.standing.lengths
-        self.mixed = [f for log in batch.resampled for f in mixed_up(physics, log, legs)]
+        self.mixed = [
+            f for log in batch.resampled for f in mixed_up(physics, log, legs, self._left(physics))
+        ]
+        if not self.mixed and self.standing.mistakes:
+            self.mixed = [slightly_mixed_up(self.runs, self.standing.mistakes)]
         if self.mixed:  # lengths are not fitted to a log whose zeros are in doubt
             self.standing = StandingLengths()
         self.lengths = lengths = dict(self.standing.lengths)
@@ -274,6 +278,17 @@ class RobotProblem(Problem):
         if faults := list(mixed_commands(self.state, rows, r)):
             return faults
         return list(contradictions(self.state, rows, r, self._sensor_columns))
+
+    def _left(self, physics: Physics) -> Callable[[ResampledLog], float]:
+        """What the model leaves of another log."""
+
+        def left(log: ResampledLog) -> float:
+            batch, sensors = Batch((log,)), SensorFaults(self.model.effects)
+            given = {}, ground_of(self.model)[1], self.unknown, stated_noise(batch)
+            state = linearise_at(physics, batch, sensors, *given)
+            return rms(state.pick(state.residuals([{}])))
+
+        return left
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""

@@ -7,15 +7,14 @@ residual of the whole log along the same measured motion.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array, Flags, Rows
-from kemba.identify.robot.batch import Batch, ResampledLog
-from kemba.identify.robot.mix_ups import ALIKE, MixUp, command_mix_ups
+from kemba.identify.robot.batch import Batch
+from kemba.identify.robot.mix_ups import SAME, command_mix_ups, corrected
 from kemba.identify.robot.state import LinearisedState
 
 HINT = "correct it in a column map (--map)"
@@ -26,43 +25,36 @@ def mixed_commands(state: LinearisedState, rows: Rows, r: Array) -> Iterator[Kem
     """The mistake about commands without which the model as it is leaves much less than the
     residual r (n,), run by run, with all that leave as little."""
     runs = range(len(state.batch.resampled))
-    before = [_rms(r[rows.run == i]) for i in runs]
+    before = [rms(r[rows.run == i]) for i in runs]
     if max(before) < BETTER:
         return  # noise alone leaves one
-    left = {m.text: _commanded(state, m) for m in command_mix_ups(state.physics.legs)}
+    left = {}
+    for mistake in command_mix_ups(state.physics.legs):
+        right = [corrected(log, state.physics, [mistake]) for log in state.batch.resampled]
+        left[mistake.text] = state.commanded(Batch(tuple(right)))
     for i, log in enumerate(state.batch.resampled):
         own = rows.run == i
-        after = {text: _rms(other[own]) for text, other in left.items()}
+        after = {text: rms(other[own]) for text, other in left.items()}
         best = min(after, key=after.__getitem__)
         power = _power(state.physics.channels, left[best], rows, own)
         if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
-            alike = [t for t in after if after[t] < ALIKE * after[best] and after[t] * BETTER < before[i]]
             yield KembaError(
                 log.name,
-                "; or ".join(sorted(alike, key=after.__getitem__)),
+                "; or ".join(text for text, e in after.items() if e <= SAME * after[best]),
                 f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f} times "
                 "then",
                 HINT,
             )
 
 
-def _rms(r: Array) -> float:
+def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:
+    """Mistakes that move feet by millimetres, where no lengths make them stand as well."""
+    what = "corrected, feet stand on level ground; else legs of other lengths would be needed"
+    return KembaError(", ".join(runs), "; or ".join(mistakes), what, HINT)
+
+
+def rms(r: Array) -> float:
     return float(np.sqrt(np.mean(r**2)))
-
-
-def _commanded(state: LinearisedState, mistake: MixUp) -> Array:
-    """The residual (n,) of the model with a mistake about commands put right."""
-    legs, logs = state.physics.legs, state.batch.resampled
-    return state.commanded(Batch(tuple(_corrected(log, legs, mistake) for log in logs)))
-
-
-def _corrected(log: ResampledLog, legs: Sequence[str], mistake: MixUp) -> ResampledLog:
-    hips = [f"{leg}/hip/tau" for leg in legs]
-    valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
-    y = {**dict(zip(hips, log.torque.T, strict=True)), **dict(zip(valves, log.sent, strict=True))}
-    y |= mistake.change(y)
-    torque = np.stack([y[name] for name in hips], axis=1)
-    return replace(log, torque=torque, sent=tuple(y[name] for name in valves))
 
 
 # When robot logs contradict themselves or any model.
