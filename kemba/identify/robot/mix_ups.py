@@ -20,6 +20,7 @@ from scipy.ndimage import minimum_filter1d
 from scipy.optimize import minimize_scalar
 
 from kemba.effects.pneumatics.switching import Pulse
+from kemba.effects.sensors import SensorBias, SensorScale
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.problem.types import Array, Theta
@@ -41,7 +42,11 @@ SMALL = 0.012
 BETTER = 2.5  # factor by which a mix-up must make the feet stand better
 ZERO = 0.05  # the latter where other lengths of the legs make feet stand, too [m]
 ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told by feet
-SAME = 1.1  # the same by what the model leaves
+# sizes of a sensor's bias or gain from which these are mistakes, and no effects: the zero of an
+# angle is set by eye, a piston has its stops
+LARGE, BY_EYE = 3.0, 10.0
+FINE = 2e-3  # share of its reach to which a zero is found
+SAME = 1.02  # the same by what the model leaves: thousands of rows tell so much
 QUARTER = np.pi / 2  # turns by which hips are mounted wrongly [rad]
 REACH = {"hip/q": QUARTER / 2, "piston/x": 0.02, "body/pitch": 0.4}  # of a zero, from its start
 
@@ -51,7 +56,8 @@ class MixUp:
     """One mistake in words, what it is a mistake `about`, and the columns put right.
 
     `at`: where it is that of a zero, the same for a zero that is so much more, up to `reach`; it is
-    where the lowest foot is on the ground if that is infinite.
+    where the lowest foot is on the ground if that is infinite. `small`: it is an effect, which a
+    sensor may have.
     """
 
     text: str
@@ -59,6 +65,7 @@ class MixUp:
     change: Change
     at: Callable[[float], MixUp] | None = None
     reach: float = 0.0
+    small: bool = False
 
 
 Some = Sequence[MixUp]
@@ -68,7 +75,7 @@ def mixed_up(
     physics: Physics,
     log: ResampledLog,
     lengths: Theta | None = None,
-    left: Callable[[ResampledLog], float] = lambda log: 1.0,
+    left: Callable[[ResampledLog], float] = lambda _: 1.0,
 ) -> Iterator[KembaError]:
     """The mistake in the columns of a log, or two of them, if its feet stand much better without.
 
@@ -81,31 +88,30 @@ def mixed_up(
     if error is None or error < STILL:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
-    goal, least = min(SMALL, error / BETTER), ZERO if lengths else SMALL
+    goal = min(SMALL, error / BETTER)
     if lengths:
         goal = min(goal, ALIKE * (feet.restless([], lengths) or goal))
     for count in range(1, 2 if lengths or error < SMALL else 3):
-        trials = []
-        for some in combinations(known, count):
-            if count == 2 and some[0].about & some[1].about:
-                continue
-            some = feet.fitted(some)
-            after = feet.restless(some)
-            far = least if any(m.about == {"body/z"} for m in some) else SMALL
-            if after is not None and after < goal and feet.moved(some) > far:
-                trials.append((after, some))
-        if trials:
-            best = min(after for after, _ in trials)
-            close = [some for after, some in trials if after <= ALIKE * best]
-            if len(close) > 1:
+        pool = combinations([m for m in known if count == 1 or not m.small], count)
+        apart = (some for some in pool if count == 1 or not some[0].about & some[1].about)
+        trials = [(feet.restless(some) or np.inf, some) for some in map(feet.fitted, apart)]
+        best = min(after for after, _ in trials)
+        if best < goal:
+            close = [some for after, some in trials if after < min(goal, ALIKE * best)]
+            least = ZERO if lengths else SMALL
+            if not all(feet.is_effect(some, least) for some in close):
                 rest = [left(corrected(log, physics, some)) for some in close]
                 close = [s for s, e in zip(close, rest, strict=True) if e <= SAME * min(rest)]
-            texts = [" and ".join(m.text for m in some) for some in close]
-            several = " (feet cannot tell these apart)" if len(texts) > 1 else ""
-            what = f"a foot is {1e3 * error:.0f} mm from where it should stand"
-            said = f"{what}: {'; or '.join(texts)}{several}"
-            yield KembaError(log.name, said, f"corrected, it is {1e3 * best:.0f} mm", HINT)
+            if not any(feet.is_effect(some, least) for some in close):
+                yield _said(log.name, error, best, close)
             return
+
+
+def _said(name: str, error: float, best: float, close: Sequence[Some]) -> KembaError:
+    texts = [" and ".join(m.text for m in some) for some in close]
+    several = " (feet cannot tell these apart)" if len(texts) > 1 else ""
+    what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {'; or '.join(texts)}"
+    return KembaError(name, what + several, f"corrected, it is {1e3 * best:.0f} mm", HINT)
 
 
 def corrected(log: ResampledLog, physics: Physics, some: Some) -> ResampledLog:
@@ -140,13 +146,19 @@ def _number(value: float, unit: str) -> str:
 
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
-    """Mistakes of one kind each, and how to put each right."""
+    """Mistakes of one kind each, effects that may look alike, and how to put each right."""
     yield from slight(legs)
     yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
     yield _zero("body/pitch counts from another zero", ["body/pitch"])
     yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
     yield _zero("body/z counts from another zero", ["body/z"])
     yield _zero("body/z counts downwards from a zero", ["body/z"], -1.0)
+    for name in (
+        "body/z",
+        "body/pitch",
+        *(f"{g}/{x}" for g in legs for x in ("hip/q", "piston/x")),
+    ):
+        yield _scale(name)
     yield _swap("body/x and body/z are swapped", ("body/x", "body/z"))
     for whose, some in _groups(legs):
         hips, torques, pistons = (
@@ -231,13 +243,25 @@ def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixU
 def _zero(text: str, names: Sequence[str], sign: float = 1.0, start: float = 0.0) -> MixUp:
     """A zero (and a sign): what is true is sign * reading - zero."""
     reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
-    unit = "rad" if names[0].endswith(("/q", "/pitch")) else "m"
+    bias = SensorBias(channel=names[0])
+    least = (BY_EYE if bias.unit == "rad" else LARGE) * bias.parameters()["b"].size
 
     def at(more: float) -> MixUp:
         zero = start + more
-        said = f"{text} ({_number(sign * zero, unit)} too much)"
-        return _each(said, names, lambda x: sign * x - zero)
+        said = f"{text} ({_number(sign * zero, bias.unit)} too much)"
+        found = _each(said, names, lambda x: sign * x - zero)
+        return replace(found, small=sign > 0.0 and abs(zero) < least)
 
+    return replace(at(0.0), at=at, reach=reach)
+
+
+def _scale(name: str) -> MixUp:
+    """A gain of a sensor that is off by a share."""
+
+    def at(share: float) -> MixUp:
+        return replace(_each(name, [name], lambda x: x / (1.0 + share)), small=True)
+
+    reach = LARGE * SensorScale(channel=name).parameters()["k"].size
     return replace(at(0.0), at=at, reach=reach)
 
 
@@ -279,15 +303,17 @@ class _Feet:
         if not self.enough:
             return None
         places, rows = self._places(some, lengths)
-        if len(rows) < FEWEST or np.median(_changed(self.y, some)["body/z"]) < 0.0:
-            return None  # the latter: the body is under the ground
+        if len(rows) < FEWEST:
+            return None
+        if some and np.median(_changed(self.y, some)["body/z"]) < 0.0:
+            return None  # the body is under the ground
         before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
         far = np.hypot(now[:, :, 1], np.linalg.norm(after - before, axis=2))
         lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
         nearest = np.take_along_axis(far, lowest, axis=1)
         return float(max(np.quantile(nearest, 0.75), np.quantile(far, 0.25, axis=0).max()))
 
-    def fitted(self, some: Some) -> Some:
+    def fitted(self, some: Some) -> list[MixUp]:
         """Mistakes about zeros, each with that after which feet stand best; of two mistakes only
         that of the height is fitted."""
         found = list(some)
@@ -301,6 +327,7 @@ class _Feet:
                     lambda more, at=at: self.restless([at(more)]) or np.inf,
                     bounds=reach,
                     method="bounded",
+                    options={"xatol": FINE * mistake.reach},
                 )
                 found[i] = at(float(best.x))
             else:
@@ -309,11 +336,13 @@ class _Feet:
                 found[i] = at(float(np.median(lowest)) if len(rows) else 0.0)
         return found
 
-    def moved(self, some: Some) -> float:
-        """How far [m] it moves the feet to put these mistakes right."""
+    def is_effect(self, some: Some, least: float) -> bool:
+        """Whether these mistakes are no more than effects: a fault that a sensor may have, or less
+        than SMALL at the feet; `least` [m]: the latter of the zero of the height."""
         (places, rows), (as_read, _) = self._places(some), self._places([])
         away = np.linalg.norm(places[rows] - as_read[rows], axis=2)
-        return float(np.nanquantile(away, 0.9, axis=0).max())
+        far = least if any(m.about == {"body/z"} for m in some) else SMALL
+        return any(m.small for m in some) or float(np.mean(away, axis=0).max()) < far
 
     def _places(self, some: Some, lengths: Theta | None = None) -> tuple[Array, np.ndarray]:
         """Places (n, legs, 2) of the feet [m], and the rows around which the ground carries the

@@ -284,8 +284,8 @@ class RobotProblem(Problem):
 
         def left(log: ResampledLog) -> float:
             batch, sensors = Batch((log,)), SensorFaults(self.model.effects)
-            given = {}, ground_of(self.model)[1], self.unknown, stated_noise(batch)
-            state = linearise_at(physics, batch, sensors, *given)
+            ground, noise = ground_of(self.model)[1], stated_noise(batch)
+            state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
             return rms(state.pick(state.residuals([{}])))
 
         return left
