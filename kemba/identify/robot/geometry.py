@@ -8,7 +8,7 @@ foot sinks into it as it is loaded, and its load goes with the body's accelerati
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 
@@ -47,6 +47,7 @@ class StandingSettings:
     zero = 0.02  # the same where it is in doubt [m]
     angle = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
     piston = 6e-4  # prior sigma of the zero of a piston [m]
+    stop = 2e-3  # the same where it is in doubt [m]
     sink = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
     soft = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
     lever = 0.04  # prior sigma of the boom's lever: two sizes
@@ -216,15 +217,19 @@ def _mistakes(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterat
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
     """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
-    be, and with the zero of the height, of the pitch or of the hips in doubt."""
-    settings, first = StandingSettings, len(standing.names)
-    hips = range(first + 2, first + 2 + standing.legs)
-    doubts = ((), [first + 1], [first], list(hips))
-    for places, wide in zip(
-        doubts, (0.0, settings.zero, settings.pitch, settings.pitch), strict=True
-    ):
+    be, and with the zero of the height, of the pitch, of the hips or of the pistons in doubt."""
+    settings, first, legs = StandingSettings, len(standing.names), standing.legs
+    hips = list(range(first + 2, first + 2 + legs))
+    doubts: Iterable[tuple[list[int], float]] = (
+        ([], 0.0),
+        ([first + 1], settings.zero),
+        ([first], settings.pitch),
+        (hips, settings.pitch),
+        ([i + legs for i in hips], settings.stop),
+    )
+    for places, wide in doubts:
         loose = width.copy()
-        loose[list(places)] = wide
+        loose[places] = wide
         yield _only(standing, (), np.where(loose == width, x, 0.0), loose, rows)[1]
 
 
