@@ -7,9 +7,8 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.ocp import load_task
-from kemba.ocp.chain import joined
 from kemba.ocp.planning import check_feasible
-from kemba.ocp.sequence import motions
+from kemba.ocp.reading import joined, motions
 from kemba.trajectory import Trajectory
 
 

@@ -8,7 +8,7 @@ foot sinks into it as it is loaded, and its load goes with the body's accelerati
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 
@@ -29,37 +29,35 @@ from kemba.mechanism.links import altered
 LEVER = "boom_lever"
 
 
-class StandingSettings:
-    """How lengths are found from feet that stand."""
-
-    every = 0.005  # time between the samples that are used [s]
-    # height at which the ground may seem to be [m]: as the search for the ground in contact.py
-    level = 0.02
-    window = 5e-3  # height of the band in which standing feet are [m]
-    # lengths that are tried first, one at a time, in sizes
-    tried = (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5)
-    bands = (0.02, 0.01, 5e-3, 4e-3)  # bands about the ground, from round to round [m]
-    noise = 7e-4  # noise of a standing foot's height [m]
-    together = 4.0  # samples that err together, so that they count as one
-    prior = 2.0  # prior width of a length, in sizes
-    reach = 2.5  # largest value of each, in prior widths
-    body = 3e-3  # prior sigma of the zero of the body's height [m]
-    zero = 0.02  # the same where it is in doubt [m]
-    angle = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
-    piston = 6e-4  # prior sigma of the zero of a piston [m]
-    stop = 2e-3  # the same where it is in doubt [m]
-    sink = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
-    soft = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
-    lever = 0.04  # prior sigma of the boom's lever: two sizes
-    held = 1e-6  # width of what is not free, as a share: as good as none
-    deep = 0.02  # depth below the ground at which no foot can be [m]
-    often = 0.01  # share of samples so deep from which lengths are not believed
-    gain = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
-    # gain of a mistake in the columns over any lengths from which it is named, and within which
-    # two cannot be told [nats]
-    mistaken = 12.0
-    # prior sigma of the zero of the pitch where mistakes are judged: no zero is taken for one [rad]
-    pitch = 0.05
+# How lengths are found from feet that stand.
+EVERY = 0.005  # time between the samples that are used [s]
+# height at which the ground may seem to be [m]: as the search for the ground in contact.py
+LEVEL = 0.02
+WINDOW = 5e-3  # height of the band in which standing feet are [m]
+# lengths that are tried first, one at a time, in sizes
+TRIED = (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5)
+BANDS = (0.02, 0.01, 5e-3, 4e-3)  # bands about the ground, from round to round [m]
+NOISE = 7e-4  # noise of a standing foot's height [m]
+TOGETHER = 4.0  # samples that err together, so that they count as one
+PRIOR = 2.0  # prior width of a length, in sizes
+REACH = 2.5  # largest value of each, in prior widths
+BODY = 3e-3  # prior sigma of the zero of the body's height [m]
+ZERO = 0.02  # the same where it is in doubt [m]
+ANGLE = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
+PISTON = 6e-4  # prior sigma of the zero of a piston [m]
+STOP = 2e-3  # the same where it is in doubt [m]
+SINK = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
+SOFT = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
+LONGER = 0.04  # prior sigma of the boom's lever: two sizes
+HELD = 1e-6  # width of what is not free, as a share: as good as none
+DEEP = 0.02  # depth below the ground at which no foot can be [m]
+OFTEN = 0.01  # share of samples so deep from which lengths are not believed
+GAIN = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
+# gain of a mistake in the columns over any lengths from which it is named, and within which two
+# cannot be told [nats]
+MISTAKEN = 12.0
+# prior sigma of the zero of the pitch where mistakes are judged: no zero is taken for one [rad]
+PITCH = 0.05
 
 
 @dataclass(frozen=True)
@@ -86,7 +84,7 @@ class Standing:
     ) -> None:
         self.physics, self.names, self.legs = physics, tuple(names), len(physics.legs)
         dt = float(np.median(batch.h[batch.valid]))
-        step = max(1, round(StandingSettings.every / dt))
+        step = max(1, round(EVERY / dt))
         q = batch.flat(reference.q)[::step]
         y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
         lift = steady(reference.a[..., 1:2], dt) / physics.mechanism.need_robot().gravity
@@ -148,15 +146,15 @@ def standing_lengths(
     if not sizes:
         return StandingLengths()
     standing = Standing(physics, batch, reference, tuple(sizes))
-    settings, legs = StandingSettings, standing.legs
-    zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
-    lengths, zeros = [settings.prior * size for size in sizes.values()], [*zeros, settings.sink]
-    free = np.array([*lengths, *zeros, settings.lever])
-    width = np.array([*lengths, *zeros, settings.lever * settings.held])
+    legs = standing.legs
+    zeros = [ANGLE, BODY, *[ANGLE] * legs, *[PISTON] * legs, SINK]
+    lengths = [PRIOR * size for size in sizes.values()]
+    free = np.array([*lengths, *zeros, LONGER])
+    width = np.array([*lengths, *zeros, LONGER * HELD])
     start = np.zeros(len(width))
     most = _most_rows(standing.heights(start)[0])
     for i, size in enumerate(sizes.values()):
-        for share in settings.tried:
+        for share in TRIED:
             trial = np.zeros(len(width))
             trial[i] = share * size
             count = _most_rows(standing.heights(trial)[0])
@@ -165,16 +163,16 @@ def standing_lengths(
     x, cost, rows = _refined(standing, start, width)
     if mistakes := tuple(_mistakes(standing, x, width, rows)):
         return StandingLengths(mistakes=mistakes)
-    if x[-2] > settings.soft or min(_drawn(standing, x, width, rows)) - cost < settings.gain:
+    if x[-2] > SOFT or min(_drawn(standing, x, width, rows)) - cost < GAIN:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])
-    x = one if alone - cost < settings.gain else x
-    if np.mean(standing.heights(x)[0] < -settings.deep) > settings.often:
+    x = one if alone - cost < GAIN else x
+    if np.mean(standing.heights(x)[0] < -DEEP) > OFTEN:
         return StandingLengths()  # feet in the ground: columns are wrong, not lengths
     found = {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
     boom, by_boom, _ = _only(standing, (), x, free, rows)
-    as_good = LEVER in candidates and by_boom - min(alone, cost) < settings.gain
+    as_good = LEVER in candidates and by_boom - min(alone, cost) < GAIN
     return StandingLengths(found, float(boom[-1]) if as_good else 0.0)
 
 
@@ -200,34 +198,26 @@ def _mistakes(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterat
     `x`.
     """
     loose, gains = width.copy(), {}
-    loose[len(standing.names)] = StandingSettings.pitch
+    loose[len(standing.names)] = PITCH
     drawn = loose.copy()
-    drawn[: len(standing.names)] *= StandingSettings.held
+    drawn[: len(standing.names)] *= HELD
     for mistake in slight(standing.physics.legs):
         other = standing.without(mistake)
         either = rows | _refined(other, np.zeros(len(x)), drawn)[2]
         _, best, _ = _refined(standing, x, loose, either)
         _, cost, _ = _refined(other, np.zeros(len(x)), drawn, either)
         gains[mistake.text] = best - cost
-    least = StandingSettings.mistaken
-    yield from (
-        text for text, gain in gains.items() if gain > max(least, max(gains.values()) - least)
-    )
+    most = max(gains.values())
+    yield from (text for text, gain in gains.items() if gain > max(MISTAKEN, most - MISTAKEN))
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
     """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
     be, and with the zero of the height, of the pitch, of the hips or of the pistons in doubt."""
-    settings, first, legs = StandingSettings, len(standing.names), standing.legs
+    first, legs = len(standing.names), standing.legs
     hips = list(range(first + 2, first + 2 + legs))
-    doubts: Iterable[tuple[list[int], float]] = (
-        ([], 0.0),
-        ([first + 1], settings.zero),
-        ([first], settings.pitch),
-        (hips, settings.pitch),
-        ([i + legs for i in hips], settings.stop),
-    )
-    for places, wide in doubts:
+    doubts: Sequence[list[int]] = ([], [first + 1], [first], hips, [i + legs for i in hips])
+    for places, wide in zip(doubts, (0.0, ZERO, PITCH, PITCH, STOP), strict=True):
         loose = width.copy()
         loose[places] = wide
         yield _only(standing, (), np.where(loose == width, x, 0.0), loose, rows)[1]
@@ -239,7 +229,7 @@ def _only(
     """The refined fit with all lengths but the `free` ones as the model has them."""
     held = np.array([i not in free for i in range(len(standing.names))])
     narrow, begin = width.copy(), x.copy()
-    narrow[: len(held)][held] *= StandingSettings.held
+    narrow[: len(held)][held] *= HELD
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
 
@@ -251,9 +241,8 @@ def _most_rows(heights: Array) -> int:
 
 def _crowd(heights: Array) -> Array:
     """The heights of the samples that stand at one height near that of the ground."""
-    settings = StandingSettings
-    near = np.sort(heights[np.abs(heights) < settings.level])
-    ends = np.searchsorted(near, near + settings.window)
+    near = np.sort(heights[np.abs(heights) < LEVEL])
+    ends = np.searchsorted(near, near + WINDOW)
     first = int(np.argmax(ends - np.arange(len(near)))) if len(near) else 0
     return near[first : ends[first]] if len(near) else near
 
@@ -263,10 +252,9 @@ def _refined(
 ) -> tuple[Array, float, Flags]:
     """The best x (k,) with prior widths (k,), half the sum of squares, and the samples (n, legs)
     that stand; `rows`: which samples are known to."""
-    settings = StandingSettings
-    weight = 1.0 / (settings.noise * np.sqrt(settings.together))
+    weight = 1.0 / (NOISE * np.sqrt(TOGETHER))
     cost = 0.0
-    for band in settings.bands:
+    for band in BANDS:
         heights, _ = standing.heights(x)
         crowd = _crowd(heights)
         level = float(np.median(crowd)) if len(crowd) else 0.0
@@ -286,9 +274,8 @@ def _fit(
     def slopes(z: Array) -> Array:
         return np.vstack([weight * standing.heights(z * width)[1][rows] * width, np.eye(len(z))])
 
-    reach = StandingSettings.reach
-    start = np.clip(x / width, -0.99 * reach, 0.99 * reach)
+    start = np.clip(x / width, -0.99 * REACH, 0.99 * REACH)
     found = least_squares(
-        residual, start, slopes, (-reach, reach), loss="soft_l1", f_scale=2.0, max_nfev=10
+        residual, start, slopes, (-REACH, REACH), loss="soft_l1", f_scale=2.0, max_nfev=10
     )
     return found.x * width, float(found.cost)

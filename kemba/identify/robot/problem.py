@@ -33,7 +33,14 @@ from kemba.identify.problem.types import (
 )
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.forces import formula_columns, robot_force_channels, robot_missing
+from kemba.identify.robot.forces import (
+    changes,
+    describe,
+    formula_columns,
+    robot_force_channels,
+    robot_missing,
+    robot_operating_point,
+)
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
 from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.noise import (
@@ -45,7 +52,6 @@ from kemba.identify.robot.noise import (
 )
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
-from kemba.identify.robot.rows import changes, describe, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
 from kemba.identify.robot.validate import contradictions, mixed_commands, rms, slightly_mixed_up
 from kemba.model.model import Model

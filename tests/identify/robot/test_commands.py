@@ -15,7 +15,7 @@ LEGS = ("front", "rear")
 
 @pytest.fixture(scope="module")
 def logs() -> list[Trajectory]:
-    return hops(runs=1)[0]
+    return hops(runs=1, seed=1)[0]
 
 
 def problem(log: Trajectory) -> RobotProblem:
