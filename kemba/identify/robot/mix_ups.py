@@ -45,7 +45,7 @@ ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told
 # sizes of a sensor's bias or gain from which these are mistakes, and no effects: the zero of an
 # angle is set by eye, a piston has its stops
 LARGE, BY_EYE = 3.0, 10.0
-FINE = 2e-3  # share of its reach to which a zero is found
+GRID, FINE = 9, 2e-3  # zeros that are tried first; share of its reach to which one is found
 SAME = 1.02  # the same by what the model leaves: thousands of rows tell so much
 QUARTER = np.pi / 2  # turns by which hips are mounted wrongly [rad]
 REACH = {"hip/q": QUARTER / 2, "piston/x": 0.02, "body/pitch": 0.4}  # of a zero, from its start
@@ -322,10 +322,12 @@ class _Feet:
             if at is None or (len(some) > 1 and np.isfinite(mistake.reach)):
                 continue
             if np.isfinite(mistake.reach):
-                reach = (-mistake.reach, mistake.reach)
+                grid = np.linspace(-mistake.reach, mistake.reach, GRID)
+                left = [self.restless([at(more)]) or np.inf for more in grid]
+                near, step = grid[int(np.argmin(left))], grid[1] - grid[0]
                 best = minimize_scalar(
                     lambda more, at=at: self.restless([at(more)]) or np.inf,
-                    bounds=reach,
+                    bounds=(near - step, near + step),
                     method="bounded",
                     options={"xatol": FINE * mistake.reach},
                 )
