@@ -2,7 +2,7 @@
 
 A foot that stands is at the height of the ground, whatever pushes it. Lengths that bring more rows
 of the logs to one height are believed where they do so much better than faults of sensors, and
-where the other sign of the body's pitch does not do better still. Nor where the ground is soft: a
+where no mistake in the columns does better still. Nor where the ground is soft: a
 foot sinks into it as it is loaded, and its load goes with the body's acceleration.
 """
 
@@ -20,6 +20,7 @@ from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
+from kemba.identify.robot.mix_ups import MixUp, slight
 from kemba.identify.robot.physics import Physics, SampleMap
 from kemba.identify.robot.reference import Reference
 from kemba.mechanism.knee import flexion_of
@@ -44,6 +45,7 @@ BODY = 3e-3  # prior sigma of the zero of the body's height [m]
 ZERO = 0.02  # the same where it is in doubt [m]
 ANGLE = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
 PISTON = 6e-4  # prior sigma of the zero of a piston [m]
+STOP = 2e-3  # the same where it is in doubt [m]
 SINK = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
 SOFT = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
 LONGER = 0.04  # prior sigma of the boom's lever: two sizes
@@ -51,22 +53,22 @@ HELD = 1e-6  # width of what is not free, as a share: as good as none
 DEEP = 0.02  # depth below the ground at which no foot can be [m]
 OFTEN = 0.01  # share of samples so deep from which lengths are not believed
 GAIN = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
-# gain of the other sign of the pitch over any lengths, from which the sign is said to be
-# reversed [nats]
-TURNED = 12.0
-# prior sigma of the zero of the pitch where its sign is judged: no zero is taken for a sign
-# [rad]
+# gain of a mistake in the columns over any lengths from which it is named, and within which two
+# cannot be told [nats]
+MISTAKEN = 12.0
+# prior sigma of the zero of the pitch where mistakes are judged: no zero is taken for one [rad]
 PITCH = 0.05
 
 
 @dataclass(frozen=True)
 class StandingLengths:
     """Theta with the `lengths` [m] at which feet stand; `lever`: share by which a longer boom makes
-    them stand as well, 0 where none does; `turned`: they stand with the other sign of the pitch."""
+    them stand as well, 0 where none does; `mistakes` in the columns: they stand without any of them
+    better than with any lengths."""
 
     lengths: Mapping[str, float] = field(default_factory=dict)
     lever: float = 0.0
-    turned: bool = False
+    mistakes: tuple[str, ...] = ()
 
 
 class Standing:
@@ -80,7 +82,7 @@ class Standing:
     def __init__(
         self, physics: Physics, batch: Batch, reference: Reference, names: Sequence[str]
     ) -> None:
-        self.names, self.legs = tuple(names), len(physics.legs)
+        self.physics, self.names, self.legs = physics, tuple(names), len(physics.legs)
         dt = float(np.median(batch.h[batch.valid]))
         step = max(1, round(EVERY / dt))
         q = batch.flat(reference.q)[::step]
@@ -90,11 +92,16 @@ class Standing:
         self.samples = [q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None]]
         self._map = SampleMap(self._function(physics))
 
-    def turned(self) -> Standing:
-        """The same with the other sign of the body's pitch."""
-        found, q = copy(self), self.samples[0].copy()
-        q[:, 2] *= -1
-        found.samples = [q, *self.samples[1:]]
+    def without(self, mistake: MixUp) -> Standing:
+        """The same with a mistake in the columns put right."""
+        found, legs = copy(self), self.physics.legs
+        body, pistons, load = self.samples
+        names = ["body/x", "body/z", "body/pitch", *(f"{leg}/hip/q" for leg in legs)]
+        y = dict(zip(names, body.T, strict=True))
+        y |= {f"{leg}/piston/x": x for leg, x in zip(legs, pistons.T, strict=True)}
+        y |= mistake.change(y)
+        columns = np.stack(list(y.values()), axis=1)
+        found.samples = [columns[:, : len(names)], columns[:, len(names) :], load]
         return found
 
     def _function(self, physics: Physics) -> ca.Function:
@@ -154,8 +161,8 @@ def standing_lengths(
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
-    if _is_turned(standing, x, width, rows):
-        return StandingLengths(turned=True)
+    if mistakes := tuple(_mistakes(standing, x, width, rows)):
+        return StandingLengths(mistakes=mistakes)
     if x[-2] > SOFT or min(_drawn(standing, x, width, rows)) - cost < GAIN:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
@@ -184,30 +191,35 @@ def remarks(found: StandingLengths) -> list[str]:
     return [f"{said}, {other}; contacts were read with the former"]
 
 
-def _is_turned(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
-    """Whether feet stand better with the other sign of the pitch than with any lengths.
+def _mistakes(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[str]:
+    """Slight mistakes in the columns without which feet stand better than with any lengths.
 
-    Judged by the samples (n, legs) that stand with either: `rows` with this sign, fitted by `x`.
+    Each is judged by the samples (n, legs) that stand with or without it: `rows` with it, fitted by
+    `x`.
     """
-    loose, turned = width.copy(), standing.turned()
+    loose, gains = width.copy(), {}
     loose[len(standing.names)] = PITCH
     drawn = loose.copy()
     drawn[: len(standing.names)] *= HELD
-    either = rows | _refined(turned, np.zeros(len(x)), drawn)[2]
-    _, best, _ = _refined(standing, x, loose, either)
-    _, other, _ = _refined(turned, np.zeros(len(x)), drawn, either)
-    return best - other > TURNED
+    for mistake in slight(standing.physics.legs):
+        other = standing.without(mistake)
+        either = rows | _refined(other, np.zeros(len(x)), drawn)[2]
+        _, best, _ = _refined(standing, x, loose, either)
+        _, cost, _ = _refined(other, np.zeros(len(x)), drawn, either)
+        gains[mistake.text] = best - cost
+    most = max(gains.values())
+    yield from (text for text, gain in gains.items() if gain > max(MISTAKEN, most - MISTAKEN))
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
     """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
-    be, and with the zero of the height, of the pitch or of the hips in doubt."""
-    first = len(standing.names)
-    hips = range(first + 2, first + 2 + standing.legs)
-    doubts = ((), [first + 1], [first], list(hips))
-    for places, wide in zip(doubts, (0.0, ZERO, PITCH, PITCH), strict=True):
+    be, and with the zero of the height, of the pitch, of the hips or of the pistons in doubt."""
+    first, legs = len(standing.names), standing.legs
+    hips = list(range(first + 2, first + 2 + legs))
+    doubts: Sequence[list[int]] = ([], [first + 1], [first], hips, [i + legs for i in hips])
+    for places, wide in zip(doubts, (0.0, ZERO, PITCH, PITCH, STOP), strict=True):
         loose = width.copy()
-        loose[list(places)] = wide
+        loose[places] = wide
         yield _only(standing, (), np.where(loose == width, x, 0.0), loose, rows)[1]
 
 

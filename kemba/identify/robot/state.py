@@ -307,6 +307,12 @@ class LinearisedState:
         for part in at_once(len(thetas)):
             yield from self.pick(self.residuals(thetas[part])).T
 
+    def commanded(self, batch: Batch) -> Array:
+        """Whitened residual (rows,) at the base if the commands had been those of `batch`."""
+        forces = Forces(self.physics, batch, self.motion)
+        found = replace(self, batch=batch, forces=forces).residuals([self.base])
+        return self.pick(found)[:, 0]
+
     def with_noise(self, noise: Noise) -> LinearisedState:
         """The same logs and motion, filtered with this noise of the sensors."""
         if tuple(noise) == tuple(self.noise):
