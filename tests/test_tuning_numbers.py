@@ -72,9 +72,8 @@ CONSTANTS = {  # file -> names, why
     "logs/formats/mat_child.py": ("MEMORY DEEPEST", "the same limit, with room to read; depth"),
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/matching.py": (
-        "LENGTH EXTENSION ANGLE PRESSURE STEP ABSOLUTE "
-        "NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
-        "readings by which units are guessed; how the words of a name are weighed",
+        "STEP ABSOLUTE NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
+        "steps and pressures that tell a column; how the words of a name are weighed",
     ),
     "logs/draft/clock.py": (
         "RISING REPEATED STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER "

@@ -33,7 +33,7 @@ UNITS = {
     "Pa": ("Pa", "mbar", "kPa", "psi", "bar", "MPa"),
     "K": ("K", "degC"),
 }
-ANY = (1.0, 0.0, np.inf)
+ANY = (1.0, 0.0, np.inf)  # SI, whatever its size
 STROKES = (0.03, 4.0)  # shares of a known stroke between which the largest reading may lie
 Size = tuple[float, float, float]
 
