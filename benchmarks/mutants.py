@@ -65,8 +65,8 @@ def listed(path: Path = LIST) -> list[Mutant]:
 class Copy:
     """A copy of the tree in a temporary folder, in which tests are run."""
 
-    def __init__(self, folder: Path) -> None:
-        self.root = folder / "tree"
+    def __init__(self, folder: Path, longest: float = LONGEST) -> None:
+        self.root, self.longest = folder / "tree", longest
         for name in COPIED:
             source, target = ROOT / name, self.root / name
             if source.is_dir():
@@ -99,7 +99,7 @@ class Copy:
     def failing(self, tests: Sequence[str]) -> str | None:
         """The first of the quick `tests` that fails in the copy; None where all pass."""
         assert self.server.stdin and self.server.stdout
-        print(json.dumps({"tests": list(tests), "longest": LONGEST}), file=self.server.stdin)
+        print(json.dumps({"tests": list(tests), "longest": self.longest}), file=self.server.stdin)
         self.server.stdin.flush()
         code, failed = json.loads(self.server.stdout.readline())
         if code not in (HANGS, 0, 1, 2):

@@ -3,8 +3,7 @@
     python benchmarks/program_page.py
 
 Reads benchmarks/program.json (kept by fuzz.py, faults.py, calibration.py, redrawn_noise.py and
-mutants.py) and
-benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
+mutants.py), benchmarks/random_mutants.jsonl with .yaml, and benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
 """
 
 import json
@@ -13,6 +12,7 @@ from statistics import median
 from typing import Any
 
 from program import load
+from random_mutants import listed
 from scipy.stats import kstest
 
 from kemba.config import load_yaml
@@ -23,6 +23,7 @@ from kemba.scenarios.share import wilson
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "benchmarks" / "pages" / "reliability-of-the-program.md"
 POINTS = Path(__file__).with_name("program_points.yaml")
+SAME = Path(__file__).with_name("random_mutants.yaml")
 REQUIREMENTS = Path(__file__).with_name("requirements.json")
 LOGS = (
     "sidecars",
@@ -264,6 +265,52 @@ One-line bugs are put into the code, one by one, and the tests nearest to them m
 """
 
 
+def at_random() -> str:
+    """One-line bugs at random places: drawn, noticed at once, noticed since, alike in behaviour."""
+    bugs = listed()
+    same = {(bug["file"], bug["now"]): bug["why"] for bug in load_yaml(SAME).data}
+    tried = [bug for bug in bugs if "outcome" in bug]
+    alike = {id(bug): why for bug in tried if (why := same.get((bug["file"], line(bug))))}
+    judged = [bug for bug in tried if id(bug) not in alike]
+    at_once = [bug["outcome"] == "killed" for bug in judged]
+    since = [bug.get("again", bug["outcome"]) == "killed" for bug in judged]
+    rows = [
+        [name, sum(killed), len(killed), "{:.0%}, {:.0%} to {:.0%}".format(*share(killed))]
+        for name, killed in (("before", at_once), ("with the tests added since", since))
+    ]
+    alive = [bug for bug, killed in zip(judged, since, strict=True) if not killed]
+    told = [f"- survives: `{bug['file']}`: `{line(bug)}`" for bug in alive]
+    told += [
+        f"- alike: `{bug['file']}`: `{line(bug)}` ({alike[id(bug)]})"
+        for bug in tried
+        if id(bug) in alike
+    ]
+    listing = "\n".join(told)
+    return f"""## Would they notice bugs that nobody chose?
+
+Of {bugs[0]["places"]} changes of one line (comparisons, signs, constants, branches, keywords, order
+of arguments) of the code of motions, of the loop, of inference and of readers, {len(bugs)} were
+drawn with seed {bugs[0]["seed"]} (`benchmarks/random_mutants.py`, `benchmarks/mutations.py`), each
+run against the quick tests of the folder that mirrors its file's, and those that import its module.
+{len(tried)} were run in the order in which they were drawn, {len(bugs) - len(tried)} were not;
+{len(alike)} change no behaviour and do not count.
+
+{table(["tests", "noticed", "of", "share, 95 %"], rows)}
+
+{listing}
+"""
+
+
+def line(bug: dict[str, Any]) -> str:
+    """The changed line of a bug at random."""
+    return bug["now"].splitlines()[-1].strip()
+
+
+def share(killed: list[bool]) -> tuple[float, float, float]:
+    """The share that was noticed, with its interval."""
+    return sum(killed) / max(len(killed), 1), *wilson(sum(killed), len(killed))
+
+
 def reached(whole: dict[str, dict[str, Any]]) -> str:
     """What was aimed at, and how much of it was really run."""
     inputs = whole.get("fuzz", {})
@@ -315,6 +362,7 @@ def main() -> None:
         faults(whole.get("faults", {}), code.get("faults", {})),
         calibration(whole.get("calibration", {}), whole.get("redrawn noise", {})),
         mutants(whole.get("mutants", {}).get("all", {})),
+        at_random(),
         points(),
     ]
     text = "\n".join(parts)
