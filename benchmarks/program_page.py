@@ -3,7 +3,8 @@
     python benchmarks/program_page.py
 
 Reads benchmarks/program.json (kept by fuzz.py, faults.py, calibration.py, redrawn_noise.py and
-mutants.py), benchmarks/random_mutants.jsonl with .yaml, and benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
+mutants.py), benchmarks/random_mutants.jsonl with .yaml, and benchmarks/program_points.yaml (24
+defects that were found once, and the tests that watch them).
 """
 
 import json
@@ -266,12 +267,12 @@ One-line bugs are put into the code, one by one, and the tests nearest to them m
 
 
 def at_random() -> str:
-    """One-line bugs at random places: drawn, noticed at once, noticed since, alike in behaviour."""
+    """One-line bugs at random places: drawn, noticed at once, noticed since, equivalent."""
     bugs = listed()
     same = {(bug["file"], bug["now"]): bug["why"] for bug in load_yaml(SAME).data}
     tried = [bug for bug in bugs if "outcome" in bug]
-    alike = {id(bug): why for bug in tried if (why := same.get((bug["file"], line(bug))))}
-    judged = [bug for bug in tried if id(bug) not in alike]
+    equal = {id(bug): why for bug in tried if (why := same.get((bug["file"], line(bug))))}
+    judged = [bug for bug in tried if id(bug) not in equal]
     at_once = [bug["outcome"] == "killed" for bug in judged]
     since = [bug.get("again", bug["outcome"]) == "killed" for bug in judged]
     rows = [
@@ -281,9 +282,9 @@ def at_random() -> str:
     alive = [bug for bug, killed in zip(judged, since, strict=True) if not killed]
     told = [f"- survives: `{bug['file']}`: `{line(bug)}`" for bug in alive]
     told += [
-        f"- alike: `{bug['file']}`: `{line(bug)}` ({alike[id(bug)]})"
+        f"- equivalent: `{bug['file']}`: `{line(bug)}` ({equal[id(bug)]})"
         for bug in tried
-        if id(bug) in alike
+        if id(bug) in equal
     ]
     listing = "\n".join(told)
     return f"""## Would they notice bugs that nobody chose?
@@ -293,7 +294,7 @@ of arguments) of the code of motions, of the loop, of inference and of readers, 
 drawn with seed {bugs[0]["seed"]} (`benchmarks/random_mutants.py`, `benchmarks/mutations.py`), each
 run against the quick tests of the folder that mirrors its file's, and those that import its module.
 {len(tried)} were run in the order in which they were drawn, {len(bugs) - len(tried)} were not;
-{len(alike)} change no behaviour and do not count.
+{len(equal)} are equivalent and do not count.
 
 {table(["tests", "noticed", "of", "share, 95 %"], rows)}
 
