@@ -107,19 +107,20 @@ def main() -> None:
     parser.add_argument("--draw", type=int, default=0, help="make a new list of so many")
     parser.add_argument("--seed", type=int, default=57)
     parser.add_argument("--again", action="store_true", help="try those that survived once more")
+    parser.add_argument("--only", default="", help="those whose file contains this")
     arguments = parser.parse_args()
     if arguments.draw:
         keep(drawn(arguments.draw, arguments.seed))
     else:
-        study("again" if arguments.again else "outcome")
+        study("again" if arguments.again else "outcome", arguments.only)
 
 
-def study(key: str) -> None:
+def study(key: str, only: str) -> None:
     """Run what was not tried, or what survived, and keep each outcome under the key."""
     bugs = listed()
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder), LONGEST)
-        for bug in bugs:
+        for bug in (bug for bug in bugs if only in bug["file"]):
             if bug.get("outcome") == (None if key == "outcome" else "survived"):
                 cost = seconds(copy, tests(bug["file"]))
                 order = tuple(sorted(cost, key=cost.__getitem__))
