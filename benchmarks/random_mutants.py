@@ -90,16 +90,17 @@ def tests(file: str) -> list[str]:
 
 
 def seconds(copy: Copy, files: list[str]) -> dict[str, float]:
-    """How long test files take without a bug, by a file of the computer's; all must pass."""
+    """How long test files take without a bug, by a file of the computer's; what fails without one,
+    as a test of links to files that are not copied, is left out and told."""
     known = json.loads(SECONDS.read_text("utf-8")) if SECONDS.is_file() else {}
     for file in files:
         if file not in known:
             begin = time.monotonic()
             if failed := copy.failing([file]):
-                raise SystemExit(f"fails without any bug: pytest '{failed}'")
-            known[file] = time.monotonic() - begin
+                print(f"left out, fails without any bug: {failed}", flush=True)
+            known[file] = None if failed else time.monotonic() - begin
             SECONDS.write_text(json.dumps(known), "utf-8")
-    return {file: known[file] for file in files}
+    return {file: known[file] for file in files if known[file] is not None}
 
 
 def main() -> None:
