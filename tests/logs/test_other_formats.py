@@ -17,8 +17,9 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map
-from kemba.logs.foreign import raw_columns
+from kemba.logs.foreign import mapped, raw_columns
 from kemba.logs.formats.mcap import Topic
+from kemba.logs.recording import Recording
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")
@@ -403,3 +404,20 @@ def test_readings_just_outside_the_log_count_at_their_own_times(tmp_path: Path) 
     }
     log = open_log(tmp_path / "log.mat", ColumnMap(kind="bench", columns=columns))
     assert log["piston/F"][[0, 3, 6, 9]] == pytest.approx([0.0, 3.0, 6.0, 9.0])
+
+
+def test_stamps_of_this_century_keep_their_nanoseconds() -> None:
+    """A float of so many nanoseconds is 256 of them off: 0.26 of this channel."""
+    fast = START + np.arange(10) * 10**6
+    slow = START + np.array([300, 3_000_100, 6_000_200, 9_000_077])
+    raw = Recording(
+        {"t": fast, "x": np.zeros(10), "u": slow, "load": 1e-3 * (slow - START)},
+        clocks={"x": "t", "load": "u"},
+    )
+    columns = {
+        "time [s]": ColumnSource(source="t", unit="ns"),
+        "piston/x [m]": ColumnSource(source="x"),
+        "piston/F [N]": ColumnSource(source="load"),
+    }
+    log = mapped(raw, ColumnMap(origin="first", columns=columns), Path("log.mcap"))
+    assert log["piston/F"][[3, 6, 9]] == pytest.approx([3000.0, 6000.0, 9000.0], abs=1e-3)
