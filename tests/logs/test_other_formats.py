@@ -421,3 +421,14 @@ def test_stamps_of_this_century_keep_their_nanoseconds() -> None:
     }
     log = mapped(raw, ColumnMap(origin="first", columns=columns), Path("log.mcap"))
     assert log["piston/F"][[3, 6, 9]] == pytest.approx([3000.0, 6000.0, 9000.0], abs=1e-3)
+
+
+def test_a_series_of_a_start_and_an_increment(tmp_path: Path) -> None:
+    """As MATLAB keeps a timeseries of even steps: without the times themselves."""
+    x = np.arange(20.0) ** 2
+    info = {"Start": 0.5, "Increment": 0.01}
+    series = {name: {"Data": k * x, "TimeInfo": info} for name, k in (("x", 1), ("load", 2))}
+    savemat(tmp_path / "log.mat", series)
+    found = raw_columns(tmp_path / "log.mat", None).columns
+    assert found["time"] == pytest.approx(0.5 + 0.01 * np.arange(20))
+    assert found["x"].tolist() == x.tolist() and found["load"].tolist() == (2 * x).tolist()
