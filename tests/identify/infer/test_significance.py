@@ -13,8 +13,8 @@ from scipy.stats import kstest, norm
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.search import Search
+from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.significance import NullTest, best_gain, smallest_detectable
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 
