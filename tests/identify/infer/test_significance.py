@@ -15,7 +15,12 @@ from toy_problem import EFFECTS, Toy
 from kemba.identify.discover import discover
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, selected
-from kemba.identify.infer.significance import NullTest, best_gain, smallest_detectable
+from kemba.identify.infer.significance import (
+    NullTest,
+    best_gain,
+    bootstrap,
+    smallest_detectable,
+)
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 
 MACHINES = 200
@@ -105,3 +110,14 @@ def test_a_detectable_size_is_seen_nine_times_in_ten() -> None:
     assert size is not None
     low = norm(size, narrow).ppf(0.1)
     assert norm(0, wide).logpdf(low) - norm(0, narrow).logpdf(low) == pytest.approx(4.0, abs=0.1)
+
+
+def test_what_cannot_be_negative_is_positive_in_simulated_logs() -> None:
+    """A drag of the size that every machine may have then speaks for drag by its sign as well; of
+    its twin, which may be negative, no sign is expected."""
+    search = Search(Toy({}))
+    search.start()
+    ranker = search.base.ranker(search.base.point.mode.linear)
+    silent = np.zeros((40, len(ranker.linear.names)))
+    drag, twin = (np.median(bootstrap(ranker, silent, [(n,)]).scores) for n in ("drag", "twin"))
+    assert drag > twin + 0.3
