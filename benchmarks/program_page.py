@@ -3,8 +3,8 @@
     python benchmarks/program_page.py
 
 Reads benchmarks/program.json (kept by fuzz.py, faults.py, calibration.py, redrawn_noise.py and
-mutants.py) and
-benchmarks/program_points.yaml (24 defects that were found once, and the tests that watch them).
+mutants.py), benchmarks/random_mutants.jsonl with .yaml, and benchmarks/program_points.yaml (24
+defects that were found once, and the tests that watch them).
 """
 
 import json
@@ -13,6 +13,7 @@ from statistics import median
 from typing import Any
 
 from program import load
+from random_mutants import listed
 from scipy.stats import kstest
 
 from kemba.config import load_yaml
@@ -23,6 +24,7 @@ from kemba.scenarios.share import wilson
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "benchmarks" / "pages" / "reliability-of-the-program.md"
 POINTS = Path(__file__).with_name("program_points.yaml")
+SAME = Path(__file__).with_name("random_mutants.yaml")
 REQUIREMENTS = Path(__file__).with_name("requirements.json")
 LOGS = (
     "sidecars",
@@ -264,6 +266,62 @@ One-line bugs are put into the code, one by one, and the tests nearest to them m
 """
 
 
+PARTS = {"kemba/logs": "readers", "kemba/identify": "inference", "kemba/solve": "loop"}
+
+
+def at_random() -> str:
+    """One-line bugs at random places: drawn, run, equivalent, noticed at once, noticed since."""
+    bugs = listed()
+    same = {(bug["file"], bug["now"]): bug["why"] for bug in load_yaml(SAME).data}
+    counts: dict[str, list[int]] = {name: [0] * 5 for name in ("motions", *PARTS.values(), "all")}
+    told: list[str] = []
+    for bug in bugs:
+        part = next(
+            (name for path, name in PARTS.items() if bug["file"].startswith(path)), "motions"
+        )
+        why = same.get((bug["file"], line(bug))) if "outcome" in bug else None
+        judged = "outcome" in bug and not why
+        before = judged and bug["outcome"] == "killed"
+        since = before or (judged and bug.get("again") == "killed")
+        for name in (part, "all"):
+            for i, counted in enumerate((True, "outcome" in bug, why, before, since)):
+                counts[name][i] += bool(counted)
+        if why:
+            told.append(f"- equivalent: `{bug['file']}`: `{line(bug)}` ({why})")
+        elif judged and not since:
+            told.append(f"- survives: `{bug['file']}`: `{line(bug)}`")
+    drawn, run, equivalent, before, since = counts["all"]
+    head = ["code", "drawn", "run", "equivalent", "noticed", "noticed since"]
+    listing = "\n".join(sorted(told))
+    return f"""## Would they notice bugs that nobody chose?
+
+Of {bugs[0]["places"]} changes of one line (comparisons, signs, constants, branches, keywords, order
+of arguments) of newer code {drawn} were drawn with seed {bugs[0]["seed"]}
+(`benchmarks/random_mutants.py`, `benchmarks/mutations.py`). Each is run against the quick tests of
+the folder that mirrors its file's, and those that import its module; tests farther off, which may
+notice it as well, are not asked. {run} were run, not in the order of the draw: where tests are
+quick first. Of the {run - equivalent} that are not equivalent, by hand, these tests noticed
+{share(before, run - equivalent)}; with the tests that were added for the survivors
+{share(since, run - equivalent)}. The latter was aimed at, and says nothing of bugs that were not
+run: of these about as many are noticed as the former says.
+
+{table(head, [[name, *row] for name, row in counts.items()])}
+
+{listing}
+"""
+
+
+def line(bug: dict[str, Any]) -> str:
+    """The changed line of a bug at random."""
+    return bug["now"].splitlines()[-1].strip()
+
+
+def share(killed: int, of: int) -> str:
+    """How many were noticed, with the interval of their share."""
+    low, high = (100 * end for end in wilson(killed, max(of, 1)))
+    return f"{killed} ({100 * killed / max(of, 1):.0f} %; 95 %: {low:.0f} to {high:.0f} %)"
+
+
 def reached(whole: dict[str, dict[str, Any]]) -> str:
     """What was aimed at, and how much of it was really run."""
     inputs = whole.get("fuzz", {})
@@ -315,6 +373,7 @@ def main() -> None:
         faults(whole.get("faults", {}), code.get("faults", {})),
         calibration(whole.get("calibration", {}), whole.get("redrawn noise", {})),
         mutants(whole.get("mutants", {}).get("all", {})),
+        at_random(),
         points(),
     ]
     text = "\n".join(parts)

@@ -195,9 +195,9 @@ class _Reader:
 
 
 def pitch(x: Array, y: Array, z: Array, w: Array) -> Array:
-    """The angle (n,) by which unit quaternions turn about y, after yaw about z and before roll
-    about x; past a quarter turn it goes on where roll and yaw are small."""
-    return np.asarray(np.arctan2(2 * (w * y - z * x), 1 - 2 * (x**2 + y**2)))
+    """The angle (n,) by which quaternions, rounded ones too, turn about y, after yaw about z and
+    before roll about x; past a quarter turn it goes on where roll and yaw are small."""
+    return np.asarray(np.arctan2(2 * (w * y - z * x), w**2 + z**2 - x**2 - y**2))
 
 
 def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:

@@ -139,6 +139,7 @@ def test_what_is_no_table_is_told(tmp_path: Path) -> None:
         ("a;b\n1,5;2\n3;4\n", {"separator": ";", "decimal": ","}),
         ("1 2 3\n4 5 6\n", {"separator": "whitespace", "header": False}),
         ("title\n\na\tb\n1\t2\n3\t4\n", {"separator": "tab", "skip_rows": 2}),
+        ("front,front,rear,rear\nx,F,P,x\n1,2,3,4\n5,6,7,8\n", {"header": 2}),
     ],
 )
 def test_layouts(text: str, layout: dict[str, object], tmp_path: Path) -> None:

@@ -17,8 +17,9 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map
-from kemba.logs.foreign import raw_columns
+from kemba.logs.foreign import mapped, raw_columns
 from kemba.logs.formats.mcap import Topic
+from kemba.logs.recording import Recording
 from kemba.trajectory import Trajectory
 
 LEGS = ("front", "rear")
@@ -369,3 +370,70 @@ def test_messages_of_several_shapes_are_one_topic() -> None:
     assert columns.keys() == expected.keys() and "state" in topic.texts
     for name, values in expected.items():
         np.testing.assert_array_equal(columns[name], values)
+
+
+def test_messages_of_one_stamp_count_once() -> None:
+    """The first of them, in the order of the stamps, whatever the order in which they came."""
+    for order in ((0, 1, 2, 3), (3, 1, 0, 2)):
+        topic, sent = Topic("/log"), ((3, 1.0), (5, 2.0), (5, 9.0), (8, 4.0))
+        for i in order:
+            topic.add(sent[i][0], {"x": sent[i][1]})
+        group = topic.group()
+        assert group.time.tolist() == [3, 5, 8] and group.columns["x"].tolist() == [1, 2, 4]
+
+
+@pytest.mark.parametrize(
+    ("name", "head"),
+    [
+        ("log.lvm", ["LabVIEW Measurement", "***End_of_Header***", "", "***End_of_Header***"]),
+        ("log.sto", ["log", "version=1", "", "endheader"]),
+    ],
+)
+def test_a_cell_that_is_no_number_is_told_at_its_place(
+    name: str, head: list[str], tmp_path: Path
+) -> None:
+    rows = ["X_Value\tx", "0\t1", "0.1\toops"]
+    (tmp_path / name).write_text("\n".join([*head, *rows]) + "\n")
+    with pytest.raises(KembaError, match=rf"{name}:7:2: 'oops' is not a number"):
+        raw_columns(tmp_path / name, None)
+
+
+def test_readings_just_outside_the_log_count_at_their_own_times(tmp_path: Path) -> None:
+    """Stamps in ms; the slow clock begins before the fast one and ends after it."""
+    t, slow = np.arange(10.0), np.array([-0.5, 3.0, 6.0, 9.5])
+    savemat(tmp_path / "log.mat", {"t": t, "x": t, "t_slow": slow, "load": slow})
+    columns = {
+        "time [s]": ColumnSource(source="t", unit="ms"),
+        "piston/x [m]": ColumnSource(source="x"),
+        "piston/F [N]": ColumnSource(source="load"),
+    }
+    log = open_log(tmp_path / "log.mat", ColumnMap(kind="bench", columns=columns))
+    assert log["piston/F"][[0, 3, 6, 9]] == pytest.approx([0.0, 3.0, 6.0, 9.0])
+
+
+def test_stamps_of_this_century_keep_their_nanoseconds() -> None:
+    """A float of so many nanoseconds is 256 of them off: 0.26 of this channel."""
+    fast = START + np.arange(10) * 10**6
+    slow = START + np.array([300, 3_000_100, 6_000_200, 9_000_077])
+    raw = Recording(
+        {"t": fast, "x": np.zeros(10), "u": slow, "load": 1e-3 * (slow - START)},
+        clocks={"x": "t", "load": "u"},
+    )
+    columns = {
+        "time [s]": ColumnSource(source="t", unit="ns"),
+        "piston/x [m]": ColumnSource(source="x"),
+        "piston/F [N]": ColumnSource(source="load"),
+    }
+    log = mapped(raw, ColumnMap(origin="first", columns=columns), Path("log.mcap"))
+    assert log["piston/F"][[3, 6, 9]] == pytest.approx([3000.0, 6000.0, 9000.0], abs=1e-3)
+
+
+def test_a_series_of_a_start_and_an_increment(tmp_path: Path) -> None:
+    """As MATLAB keeps a timeseries of even steps: without the times themselves."""
+    x = np.arange(20.0) ** 2
+    info = {"Start": 0.5, "Increment": 0.01}
+    series = {name: {"Data": k * x, "TimeInfo": info} for name, k in (("x", 1), ("load", 2))}
+    savemat(tmp_path / "log.mat", series)
+    found = raw_columns(tmp_path / "log.mat", None).columns
+    assert found["time"] == pytest.approx(0.5 + 0.01 * np.arange(20))
+    assert found["x"].tolist() == x.tolist() and found["load"].tolist() == (2 * x).tolist()

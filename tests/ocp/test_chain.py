@@ -1,5 +1,6 @@
 """Motions in a row: one trajectory, requirements at their own times, the files of a sequence."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from kemba.errors import KembaError
 from kemba.ocp import load_task
 from kemba.ocp.planning import check_feasible
-from kemba.ocp.reading import joined, motions
+from kemba.ocp.reading import as_one, joined, motions
+from kemba.ocp.task.requirement import Requirement
 from kemba.trajectory import Trajectory
 
 
@@ -59,3 +61,17 @@ def test_a_sequence_that_cannot_be_is_told(tmp_path: Path, text: str, said: str)
         task, document = load_task(tmp_path / "own.yaml")
         check_feasible(task, document)
     assert said in str(caught.value)
+
+
+def test_what_a_motion_asks_is_asked_in_its_own_share_of_the_sequence(tmp_path: Path) -> None:
+    tmp_path.joinpath("own.yaml").write_text("sequence: [{motion: bound.yaml, repeat: 2}]\n")
+    _, alone = check_feasible(*load_task("bound.yaml"))
+    _, _, asked = as_one(*load_task(tmp_path / "own.yaml"))
+    halves = [(begin + end / 2) for begin in (0.0, 0.5) for end in sorted({*moments(alone)})]
+    assert sorted({*moments(asked)}) == pytest.approx(sorted({*halves}))
+
+
+def moments(requirements: Sequence[Requirement]) -> list[float]:
+    """All moments that requirements name, as shares of the nodes."""
+    during = [share for r in requirements if r.at is None for share in r.during]
+    return during + [r.at for r in requirements if r.at is not None]

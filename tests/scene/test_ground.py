@@ -10,6 +10,7 @@ import pytest
 
 from kemba.errors import ConfigErrors, KembaError
 from kemba.scene import FLAT, Scene, scene_in
+from kemba.scene.scene import AROUND
 
 HOUSE = {
     "terrain": [
@@ -124,3 +125,15 @@ def test_a_new_kind_of_terrain_is_one_class() -> None:
 def test_a_ramp_may_say_its_own_height() -> None:
     ground = scene_in({"terrain": [{"from": "1 m", "slope": "10 deg", "height": "5 cm"}]}).ground
     assert ground.height(np.array([2.0])) == pytest.approx([0.05 + np.tan(np.deg2rad(10.0))])
+
+
+def test_a_scene_is_even_where_every_place_is_like_every_other() -> None:
+    assert FLAT.even and scene_in({"terrain": [{"friction": 0.6}]}).even
+    assert not scene_in({"terrain": [{"from": "0 m", "friction": 0.6}]}).even
+    assert not scene_in(HOUSE).even
+
+
+def test_the_skyline_keeps_as_far_from_either_side_of_an_obstacle() -> None:
+    beside = np.array([-1.5, -0.5, 0.5, 1.5]) * AROUND + [0.2, 0.2, 0.25, 0.25]
+    high = 0.2 + AROUND
+    assert scene_in(HOUSE).skyline(beside) == pytest.approx([0.0, high, high, 0.0])

@@ -1,5 +1,6 @@
 """How much evidence the best of many formulas needs before it is more than chance."""
 
+from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
@@ -65,3 +66,20 @@ def searched(seed: int) -> Search:
     search = Search(toy)
     search.start()
     return search
+
+
+@pytest.mark.parametrize(("nearly", "found"), [(-1.0, False), (1.0, True)])
+def test_a_formula_gains_more_over_the_catalogues_answer_than_chance_gives(
+    monkeypatch: pytest.MonkeyPatch, nearly: float, found: bool
+) -> None:
+    """The catalogue's answer is `nearly` nats further from it than the best of as many terms."""
+    careless = NullTest(np.zeros(10), (), 200)
+    monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
+    search = next(s for s in map(searched, range(40)) if look(s, NULL) is not None)
+    alone = look(search, NULL)
+    assert alone is not None
+    null = search.points[NULL]
+    least = by_chance(len(search.problem.formulas(null.fit.theta)))
+    evidence = null.log_evidence + alone.gain - least - nearly
+    search.points["kick",] = replace(null, score=replace(null.score, log_evidence=evidence))
+    assert (look(search, ("kick",)) is not None) == found

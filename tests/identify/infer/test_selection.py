@@ -11,8 +11,10 @@ from kemba.identify.infer.ranking import equivalents
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import (
     Selection,
+    _thin,
     certain,
     likeliest_part,
+    material,
     overclaimed,
     selected,
     simplest,
@@ -163,3 +165,20 @@ def test_an_effect_whose_interval_holds_its_absence_is_not_sure(
     assert certain(Selection(("hum", "kick"), 0.01), joint, problem).best == named
     alone = Selection(("hum",), 0.01)
     assert certain(alone, joint, problem) == alone, "whether there is anything is asked elsewhere"
+
+
+def test_an_effect_that_may_as_well_be_absent_is_not_material() -> None:
+    search = searched(Toy({"kick.a": 9.0}), "kick", "wave")
+    assert material(search, ("kick", "wave")) == ("kick",)
+
+
+def test_an_answer_is_thinned_only_until_the_error_grows() -> None:
+    search, many = (
+        Search(Toy({"bend.a": 9.0, "hum.a": 9.0, "kick.a": 9.0})),
+        ("bend", "hum", "kick"),
+    )
+    search.start()
+    search.visit((*many, "wave"))
+    _thin(search, (*many, "wave"))
+    sizes = {len(h) for h in search.points if h}
+    assert many in search.points and sizes == {4, 3, 2}

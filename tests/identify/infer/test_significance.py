@@ -9,12 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import kstest
+from scipy.stats import kstest, norm
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
+from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, selected
-from kemba.identify.infer.significance import NullTest, best_gain
+from kemba.identify.infer.significance import (
+    NullTest,
+    best_gain,
+    bootstrap,
+    smallest_detectable,
+)
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 
 MACHINES = 200
@@ -88,3 +94,30 @@ def test_what_chance_does_as_often_is_not_believed() -> None:
     found = search(a=3.0)
     p_value = NullTest(np.full(99, 50.0), (), 40).p_value(best_gain(found))
     assert selected(found, ("a",), p_value) == Selection()
+
+
+def test_a_detectable_size_is_seen_nine_times_in_ten() -> None:
+    """The estimate then favours the effect over nothing by the threshold, but for its lowest
+    tenth: a weak wave, of which data and spike leave about as much open."""
+    problem, prior, threshold = Toy({}), SpikeSlabSettings, 4.0
+    problem._shapes["wave"] = 0.05 * problem._shapes["wave"]
+    search = Search(problem)
+    search.start()
+    ranker = search.base.ranker(search.base.point.mode.linear)
+    size = smallest_detectable(ranker, threshold)["wave"]
+    told = 1.0 / np.sum(problem._shapes["wave"] ** 2)  # variance of the estimate
+    narrow, wide = (np.hypot(np.sqrt(told), w * SIZE) for w in (prior.spike, prior.slab))
+    assert size is not None
+    low = norm(size, narrow).ppf(0.1)
+    assert norm(0, wide).logpdf(low) - norm(0, narrow).logpdf(low) == pytest.approx(4.0, abs=0.1)
+
+
+def test_what_cannot_be_negative_is_positive_in_simulated_logs() -> None:
+    """A drag of the size that every machine may have then speaks for drag by its sign as well; of
+    its twin, which may be negative, no sign is expected."""
+    search = Search(Toy({}))
+    search.start()
+    ranker = search.base.ranker(search.base.point.mode.linear)
+    silent = np.zeros((40, len(ranker.linear.names)))
+    drag, twin = (np.median(bootstrap(ranker, silent, [(n,)]).scores) for n in ("drag", "twin"))
+    assert drag > twin + 0.3

@@ -1,0 +1,29 @@
+"""A column map whose units do not fit is refused where it is read, before any log."""
+
+from typing import Any
+
+import pytest
+
+from kemba.errors import ConfigErrors
+from kemba.logs.columns import ColumnMap, ColumnSource, check_map
+
+TIME = ColumnSource(source="t")
+
+
+def checked(**force: Any) -> None:
+    columns = {"time [s]": TIME, "piston/F [N]": ColumnSource(source="F", **force)}
+    check_map(ColumnMap(columns=columns), "map.yaml")
+
+
+def test_units_must_be_of_the_quantity_that_they_give() -> None:
+    checked(unit="kN", add={"source": "G", "unit": "mN"})
+    for wrong in ({"unit": "kg"}, {"add": {"source": "G", "unit": "bar"}}, {"unit": "furlongs"}):
+        with pytest.raises(ConfigErrors, match=r"map\.yaml: columns: 'piston/F"):
+            checked(**wrong)
+
+
+def test_an_offset_without_unit_is_refused_where_it_could_be_in_either() -> None:
+    checked(unit="kN", offset="2 N")
+    checked(unit="N", offset=2.0)
+    with pytest.raises(ConfigErrors, match=r"offset 2 needs a unit: '2 kN' or '2 N'"):
+        checked(unit="kN", offset=2.0)

@@ -1,0 +1,30 @@
+"""Times in words, and channels of several clocks on the rows of one."""
+
+import numpy as np
+import pytest
+
+from kemba.logs.times import one_clock, placed, seconds
+from kemba.trajectory import Trajectory
+
+
+def test_a_clock_that_goes_back_a_little_does_not_begin_anew() -> None:
+    read = seconds(np.array(["10:00:00.5", "10:00:00.4", "10:00:01.5"], dtype=object))
+    assert read == pytest.approx([0.0, -0.1, 1.0])
+
+
+@pytest.mark.parametrize(("gap", "known"), [(24e-3, True), (26e-3, False)])
+def test_nothing_is_known_far_from_the_next_reading(gap: float, known: bool) -> None:
+    """Of a channel in steps of 10 ms; the row is just after the reading before the gap."""
+    own = np.cumsum([0.0, 0.01, 0.01, gap, 0.01, 0.01])
+    time = np.arange(0.0001, own[-1], 1e-3)
+    assert np.isfinite(placed(time, own, own, False)[20]) == known
+
+
+def test_channels_on_another_clock_are_named_and_no_others() -> None:
+    """`body/z` is read between the rows of `body/x`; `body/pitch` in every tenth of its rows."""
+    time = np.arange(2000) * 0.5e-3
+    x, z, pitch = (np.full(len(time), np.nan) for _ in range(3))
+    x[::2], z[1::4], pitch[::20] = time[::2], time[1::4], time[::20]
+    log = Trajectory(time, {"body/x [m]": x, "body/z [m]": z, "body/pitch [rad]": pitch})
+    (said,) = one_clock(log).meta["read"]
+    assert said.startswith("body/z have a clock of their own")
