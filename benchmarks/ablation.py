@@ -37,7 +37,6 @@ from ablation_page import table, write
 from blind import bench, report, robot, second
 from blind.kinds import Record, hidden, kind, named
 
-from kemba.identify.bench.prediction import PredictedLogs
 from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain
@@ -253,7 +252,7 @@ def remembered() -> Iterator[None]:
 
         return call
 
-    def of_one_log(self: PredictedLogs, theta: Any, index: int) -> Any:
+    def of_one_log(self: BenchProblem, theta: Any, index: int) -> Any:
         """Readings of one log: how other logs begin does not matter."""
         log = self.logs[index]
         told = ((n, v) for n, v in theta.items() if self.starts.get(n, (index,))[0] == index)
@@ -263,9 +262,9 @@ def remembered() -> Iterator[None]:
             known[key] = predict(self, theta, index)
         return known[key]
 
-    predict = PredictedLogs.readings
+    predict = BenchProblem.readings
     with ExitStack() as stack:
-        stack.enter_context(patch.object(PredictedLogs, "readings", of_one_log))
+        stack.enter_context(patch.object(BenchProblem, "readings", of_one_log))
         stack.enter_context(patch("kemba.identify.discover.joint_fit", unjudged))
         for cls in (BenchProblem, RobotProblem):
             for name in (*LEARNING, *PREDICTING):

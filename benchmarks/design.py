@@ -23,9 +23,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 from blind import report
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 
-from kemba.identify.design.rig import design_rig_test
+from kemba.identify.design.rig import JudgedRig, design_rig_test
 from kemba.identify.design.separation import ExperimentSettings
-from kemba.identify.design.virtual import JudgedRig
 from kemba.model.spec import load_model
 from kemba.scenarios.share import wilson
 

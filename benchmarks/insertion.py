@@ -17,9 +17,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from block import table_of_tasks
 
 from kemba.ocp import load_task
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.planning import Planning
-from kemba.ocp.refinement.insertion import FAILS
+from kemba.ocp.refinement.repair import FAILS
 
 TASKS = (
     *(("jump.yaml", f"height={h} m") for h in (0.43, 0.5, 0.6, 0.7, 0.8)),
@@ -39,7 +39,7 @@ def planned(name: str, changes: list[str], pulses: bool) -> str:
     """Cost and phases of the first plan, and its seconds, as cells of a table."""
     task, document = load_task(name, changes)
     began = time.process_time()
-    with patch("kemba.ocp.refinement.insertion.FAILS", FAILS if pulses else 0):
+    with patch("kemba.ocp.refinement.repair.FAILS", FAILS if pulses else 0):
         made = next(Planning.of(task, document).plans())
     seconds = time.process_time() - began
     if not made.refined or made.stages is None:

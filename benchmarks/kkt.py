@@ -22,9 +22,8 @@ from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.planner import Planner
 from kemba.ocp.task.resolve import resolve
-from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
-from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.transcription.transcribe import Parameters, Transcription
 from kemba.sweep import machine
 
 REPEATS = 20

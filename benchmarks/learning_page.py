@@ -51,9 +51,10 @@ def mixed(rows: Sequence[Row]) -> str:
 
 
 def _inside(row: Row) -> Iterator[bool]:
-    """Whether each jump after a round reached an apex within the band that the round expected."""
+    """Whether each jump after a round reached an apex within the band that the round expected,
+    where its plan was good and so was executed."""
     for fact, found in zip(row["facts"], row["rounds"][1:], strict=True):
-        if band := fact.get("expected_m"):
+        if fact.get("good") and (band := fact.get("expected_m")):
             yield from (band[0] <= apex <= band[1] for apex in found["apex_m"])
 
 

@@ -10,7 +10,7 @@ rig as the paper's Fig. 3, 4, 6 and 7 do, with the fitted model in the last.
 import argparse
 from pathlib import Path
 
-from kemba.plant import tables
+from kemba.identify import published as tables
 from kemba.plant.characterise import characterise
 from kemba.plant.rigs import bench_model, load_rig, run_rig
 from kemba.plotting import plot_rig

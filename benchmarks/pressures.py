@@ -26,8 +26,7 @@ from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import policy_arrays
 from kemba.runs import Run, load_run
-from kemba.scenarios.conditions import standing
-from kemba.scenarios.draw import Scenario, scenarios
+from kemba.scenarios.draw import Scenario, scenarios, standing
 from kemba.scenarios.feedback import executions_of
 from kemba.scenarios.share import wilson
 from kemba.trajectory import Trajectory

@@ -24,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from quality_table import RECORD, REFINED, summary, written
 
 from kemba.ocp import load_task, plan
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.solve import Approach, Listener, best_plan
 

@@ -8,7 +8,7 @@ import sys
 import time
 
 from kemba.ocp import load_task
-from kemba.ocp.certificate.objective import costs
+from kemba.ocp.certificate.certify import costs
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.refinement import Refined, refine

@@ -37,8 +37,7 @@ from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE
 from kemba.runs import Run, load_run
-from kemba.scenarios.conditions import standing
-from kemba.scenarios.draw import Scenario, scenarios
+from kemba.scenarios.draw import Scenario, scenarios, standing
 from kemba.scenarios.feedback import policy_of
 from kemba.sweep.farm import machine
 

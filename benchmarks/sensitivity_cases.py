@@ -71,12 +71,12 @@ def planning(name: str) -> Case:
     """A shipped task, planned: checks, search for a plan, refinement."""
     from kemba.ocp import load_task
     from kemba.ocp.certificate.status import Status
+    from kemba.ocp.finer import refined
     from kemba.ocp.infeasibility.checks import check_task
     from kemba.ocp.infeasibility.explain import refusal
     from kemba.ocp.nlp.ipopt import Control
     from kemba.ocp.planner import Planner, searched
     from kemba.ocp.reading import task_model
-    from kemba.ocp.refined import refined
     from kemba.ocp.relaxation.session import Session
     from kemba.ocp.task.resolve import resolve
 

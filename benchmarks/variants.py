@@ -21,12 +21,12 @@ import numpy as np
 
 from kemba.config import parse
 from kemba.ocp import Task, load_task, plan
-from kemba.ocp.functions.proximal import Newton
+from kemba.ocp.functions.problem import Newton
 from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.schedule import find, interior
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
-from kemba.ocp.transcription.parameters import Parameters
+from kemba.ocp.transcription.transcribe import Parameters
 from kemba.settings import Settings, changed
 from kemba.sweep import expand, load_sweep, machine
 

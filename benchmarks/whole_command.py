@@ -3,8 +3,8 @@
 Usage: python benchmarks/whole_command.py [--repeat N] [TASK ...]
 
 Each command runs in a process of its own. CPU seconds and wall seconds are printed for each stage.
-CPU seconds count this process and the one that draws the figure; they depend little on what else
-the machine does.
+CPU seconds count this process and those that it starts; they depend little on what else the
+machine does.
 """
 
 import argparse

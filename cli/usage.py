@@ -55,10 +55,14 @@ def _moved(args: list[str], place: str, fits: Callable[[str], bool]) -> list[str
 
 def is_picture(word: str) -> bool:
     """Whether a word behind `compare --figure` is the picture's name, not a log."""
-    return Path(word).suffix.lower() not in TABLES
+    path = Path(word)
+    return path.suffix.lower() not in TABLES and not path.is_dir()
 
 
 def is_new_folder(word: str) -> bool:
     """Whether a word behind `characterise --figure` is a folder for pictures, not logs."""
     path = Path(word)
-    return path.suffix.lower() not in TABLES and not any(path.glob("*.csv"))
+    return path.suffix.lower() not in TABLES and not [
+        *path.glob("*.csv"),
+        *path.glob("metadata.yaml"),
+    ]

@@ -12,27 +12,20 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = [
-    "adopt",
-    "compare",
-    "discover",
-    "learn",
-    "load_log",
-    "load_model",
-    "load_task",
-    "plan",
-    "simulate",
-    "solve_mpcc",
-]
+_HOMES = {
+    **dict.fromkeys(("adopt", "compare", "discover", "learn"), "api.learning"),
+    **dict.fromkeys(("load_log", "load_model", "load_task", "plan", "simulate"), "api.planning"),
+    "solve_mpcc": "ocp.mpcc.solve",
+}
+__all__ = [*_HOMES]
 
 
 def __getattr__(name: str) -> Any:
     """The library's functions, imported when first asked for: `--help` must not wait for them."""
-    if name in __all__:
+    if name in _HOMES:
         # many small matrices: more BLAS threads only wait for each other
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        home = "kemba.ocp.mpcc.solve" if name == "solve_mpcc" else "kemba.api"
-        return getattr(import_module(home), name)
+        return getattr(import_module(f"kemba.{_HOMES[name]}"), name)
     raise AttributeError(f"module 'kemba' has no attribute '{name}'")
 
 

@@ -31,19 +31,21 @@ ORDINALS = "first second third fourth fifth sixth seventh eighth ninth".split()
 
 @dataclass(frozen=True)
 class Thresholds:
-    """How a motion is read: feet below `touches` [m] touch, at a row or `between` two; an apex is
-    that of a parabola through the rows within `around` [s] of the highest and those beside it, or
-    the highest row itself where it is None."""
+    """How a motion is read: feet below `touches` [m] touch; an apex is that of a parabola through
+    the rows within `around` [s] of the highest and those beside it, or the highest row itself where
+    it is None."""
 
     touches: float
     around: float | None = None
-    between: bool = False
 
 
 PLANNED = Thresholds(1e-4)
 EXECUTED = Thresholds(1e-6, 0.0)  # the gap that the simulator's kernel calls closed
 # ten times the noise of the body's height; 40 readings average 0.3 mm of it to 0.05 mm
-MEASURED = Thresholds(3e-3, 0.02, between=True)
+MEASURED = Thresholds(3e-3, 0.02)
+# s before and after a foot seems to touch, in which its measured height bends: a soft landing loads
+# it late
+FALLS, RESTS = 0.03, 0.015
 
 
 @dataclass(frozen=True)
@@ -156,7 +158,7 @@ def contacts(
 
     def span(i: int, j: int) -> Span:
         took = 0.0 if load is None else float(np.trapezoid(load[i:j], time[i:j]))
-        begin = -math.inf if i == 0 else _begin(time, height, reading, hits, i)
+        begin = -math.inf if i == 0 else _begin(time, hits, i)
         end = math.inf if j == len(time) else float(time[j - 1])
         return Span(begin, end, took >= LASTS * weight)
 
@@ -172,15 +174,29 @@ def _first(span: Span) -> float:
     return span.begin
 
 
-def _begin(
-    time: Array, height: Array, reading: Thresholds, hits: Sequence[float], row: int
-) -> float:
+def _begin(time: Array, hits: Sequence[float], row: int) -> float:
     """When [s] a foot that is in the air in the row before touches."""
     before, at = float(time[row - 1]), float(time[row])
-    if reading.between:
-        share = (height[row - 1] - reading.touches) / (height[row - 1] - height[row])
-        return before + float(np.nan_to_num(share, nan=1.0)) * (at - before)
     return min((t for t in hits if before < t <= at + 1e-9), default=at)
+
+
+def bend(time: Array, height: Array, near: float) -> float:
+    """When [s] a foot that comes down at about `near` touches, by its measured `height` (n,) [m]:
+    where a falling line and the level on which the foot then stands fit best, by least squares.
+
+    Noise and zeros of the sensors hardly matter then. `near` where it falls by less than `STAYS`.
+    """
+    own = (time >= near - FALLS) & (time <= near + RESTS) & np.isfinite(height)
+    at, z = time[own], height[own]
+    if len(at) < 4:
+        return near
+    bends = np.arange(at[0], at[-1], 1e-4)[1:]
+    fall = np.clip(bends[:, None] - at, 0.0, None)
+    length, fall = fall.max(axis=1), fall - fall.mean(axis=1, keepdims=True)
+    power, product = np.sum(fall**2, axis=1), np.maximum(fall @ (z - z.mean()), 0.0)
+    best = int(np.argmax(product**2 / power))
+    fell = product[best] / power[best] * length[best]
+    return float(bends[best]) if fell >= STAYS else near
 
 
 def bridged(down: Mask, low: Mask) -> Mask:

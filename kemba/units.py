@@ -26,7 +26,8 @@ TOKEN = re.compile(
     r"|(?P<symbol>[A-Za-zµμΩ°%]+)(?:(?:\^|\*\*)?(?P<power>[+-]?\d{1,2}(?!\d)))?"
     r"|(?P<operator>\s*[*/.·×]\s*|\s+)|(?P<bracket>[()])"
 )
-RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+RAISED = re.compile("[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+")
+LOWERED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 HEADER_UNIT = re.compile(r"1|[A-Za-z%]+(?:-?\d+)?(?:\.[A-Za-z%]+(?:-?\d+)?)*")
 SI_SYMBOLS = frozenset("1 m s kg A K mol cd rad N Pa J W V C F Hz T H".split())
 TORQUE = re.compile(r"([kMmuµ]?N)([mc]?m)")  # `Nm` is a textile unit to pint
@@ -214,12 +215,13 @@ def _parsed(text: str) -> tuple[float, pint.Unit]:
     unreadable = f"has the unreadable unit '{text}'; units are written like m.s-1 or N.m"
     symbols: list[str] = []
     expression, end = "", 0
-    for match in TOKEN.finditer(text.strip().translate(RAISED)):
+    plain = RAISED.sub(lambda m: "^" + m[0].translate(LOWERED), text.strip())
+    for match in TOKEN.finditer(plain):
         if match.start() != end or (match["operator"] and expression[-1:] in ("", *"*/(")):
             break
         end = match.end()
         expression += _rewritten(match, symbols, expression)
-    if not expression or end != len(text.strip()):
+    if not expression or end != len(plain):
         raise ValueError(unreadable)
     try:
         found = ParserHelper.from_string(expression)

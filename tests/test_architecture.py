@@ -127,8 +127,8 @@ PLANNING = [
     "phases",
     "refinement",
 ]
-PLANNING += ["continuation", "infeasibility", "planned", "planner", "refined", "continued"]
-PLANNING += ["planning", "starts"]
+PLANNING += ["continuation", "infeasibility", "planned", "planner", "finer"]
+PLANNING += ["planning"]
 
 
 def test_planning_is_built_from_the_bottom_up() -> None:

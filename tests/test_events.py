@@ -9,12 +9,12 @@ import pytest
 from kemba.events import (
     EXECUTED,
     LASTS,
-    MEASURED,
     PLANNED,
     ContactCourse,
     EventComparison,
     Span,
     aligned,
+    bend,
     bridged,
     compared,
     contacts,
@@ -272,9 +272,20 @@ def test_touchdowns_are_told_between_rows() -> None:
     time = np.arange(0.0, 0.3, 5e-3)
     height = np.clip(0.1 - time, 0.0, None)
     exact = contacts(time, height, EXECUTED, hits=[0.0973])
-    (measured,) = contacts(time, height, MEASURED)
     assert [span.begin for span in exact] == [0.0973]
-    assert measured.begin == pytest.approx(0.097)
+
+
+@pytest.mark.parametrize("speed", [0.4, 1.5])
+@pytest.mark.parametrize("level", [0.0, 8e-3])  # m; what a sensor's zero makes of the ground
+def test_a_foot_comes_down_where_its_measured_height_bends(speed: float, level: float) -> None:
+    time = np.arange(0.0, 0.3, 1e-3)
+    height = level + np.clip(speed * (0.1533 - time), 0.0, None)
+    noise = 3e-4 * np.random.default_rng(1).standard_normal(len(time))
+    for near in (0.148, 0.170):
+        assert bend(time, height, near) == pytest.approx(0.1533, abs=2e-4)
+        assert bend(time, height + noise, near) == pytest.approx(0.1533, abs=1e-3)
+    assert bend(time, np.zeros(len(time)), 0.15) == 0.15
+    assert bend(time, np.full(len(time), np.nan), 0.15) == 0.15
 
 
 def test_an_apex_lies_between_rows() -> None:

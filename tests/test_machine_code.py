@@ -33,6 +33,18 @@ def test_rows_that_feed_the_next_one_are_steps_in_time() -> None:
     np.testing.assert_allclose(passed[:, 0], x[:-1, 0], rtol=1e-14)
 
 
+def test_code_of_expressions_that_are_alike_is_made_once() -> None:
+    def sums(factor: float) -> Native:
+        x = ca.SX.sym("x", 2)
+        return Native([x], {"f": [factor * x[0] + x[1]]})
+
+    first, same, other = sums(2.0), sums(2.0), sums(3.0)
+    assert first.address == same.address != other.address
+    y = np.zeros((1, 1))
+    other.rows("f", np.ones((1, 2)), y)
+    assert y == 4.0
+
+
 def test_rows_must_lie_in_one_piece() -> None:
     x = ca.SX.sym("x", 2)
     code = Native([x], {"f": [x[0] + x[1]]})

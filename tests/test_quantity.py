@@ -38,6 +38,7 @@ UNIT = st.sampled_from(["1", "m", "m.s-1", "N.s2.m-2", "rad.s-1", "kg.m2", "Pa"]
         ("2 m/s", "m.s-1", 2.0),
         ("3 1/s", "s-1", 3.0),
         ("1e-3", "m", 0.001),
+        ("5 m.s⁻¹", "m.s-1", 5.0),
         (".5 m", "m", 0.5),
         ("-3 mm", "m", -0.003),
         ("0.5 rad", "1", 0.5),
@@ -46,6 +47,16 @@ UNIT = st.sampled_from(["1", "m", "m.s-1", "N.s2.m-2", "rad.s-1", "kg.m2", "Pa"]
 )
 def test_values_in_si(text: str, unit: str, expected: float) -> None:
     assert to_si(text, unit) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "size"),
+    [("1²", "1", 1.0), ("10³ Pa", "Pa", 1e3), ("cm²", "m2", 1e-4), ("10⁻³ m", "m", 1e-3)],
+)
+def test_raised_digits_are_powers(unit: str, si: str, size: float) -> None:
+    assert convert(5.0, unit, si) == pytest.approx(5.0 * size)
+    with pytest.raises(ValueError, match="unreadable unit"):
+        convert(5.0, "(m)²", "m2")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.ocp import load_task, task_model
-from kemba.ocp.refinement.sample import to_trajectory
+from kemba.ocp.refinement.start import to_trajectory
 from kemba.ocp.transcription.stage import COST_SCALE
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute

@@ -37,9 +37,11 @@ CONSTANTS = {  # file -> names, why
     "effects/mechanics/hip.py": ("W_COULOMB", "smoothing width of a formula"),
     "effects/base.py": ("REMEASURED", "tolerance of what a discovery has measured"),
     "effects/sensors.py": ("CHANNELS", "noise of the robot's sensors"),
-    "mechanism/pin_model.py": ("COUNTER_CLOCKWISE DOWN", "directions"),
-    "mechanism/robot.py": ("HIP_RANGE", "geometry: where the knee would rise above the body"),
-    "plant/tables.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
+    "mechanism/robot.py": (
+        "HIP_RANGE COUNTER_CLOCKWISE DOWN",
+        "geometry: where the knee would rise above the body; directions",
+    ),
+    "identify/published.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
     "plant/rigs.py": (
         "FORCE_NOISE VALVES SPEEDS",
         "noise of a force transducer; what a bench test does unless its file says more",
@@ -54,12 +56,11 @@ CONSTANTS = {  # file -> names, why
         "steps of the robot's encoders; scatter of the robot's valves",
     ),
     "plant/controller.py": ("PERIOD", "rate of the robot's controller"),
-    "ocp/mpcc/homotopy.py": (
-        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED",
+    "ocp/mpcc/solve.py": (
+        "LOOSE FACTOR EXACT OFF LONG BRANCH SCALED TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL STEP "
+        "LONGEST",
         "figures of a general method, chosen on NOSBENCH (benchmarks/pages/nosbench.md)",
     ),
-    "ocp/mpcc/solve.py": ("TRIED MARGIN SWITCHES PAYS SLOPE RESIDUAL", "the same"),
-    "ocp/mpcc/stationary.py": ("STEP LONGEST", "the same"),
     "ocp/nlp/ending.py": ("USUAL", "iterations of which a median is taken"),
     "ocp/controller.py": ("PERIOD", "rate of the robot's controller"),
     "effects/rigs/axis.py": ("PLATE", "tolerance of an effect's figures"),
@@ -71,9 +72,8 @@ CONSTANTS = {  # file -> names, why
     "logs/formats/mat_child.py": ("MEMORY DEEPEST", "the same limit, with room to read; depth"),
     "logs/formats/mcap.py": ("NS", "nanoseconds of a second"),
     "logs/draft/matching.py": (
-        "LENGTH EXTENSION ANGLE PRESSURE STEP ABSOLUTE "
-        "NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
-        "readings by which units are guessed; how the words of a name are weighed",
+        "STEP ABSOLUTE NOTHING ENOUGH SAID_TOO UNRELATED ASKED_FOR STRANGER SURE",
+        "steps and pressures that tell a column; how the words of a name are weighed",
     ),
     "logs/draft/clock.py": (
         "RISING REPEATED STAMPED ALIKE NEAR PLOTTER NAMED MENTIONED BY_UNIT UNNAMED COUNTER "
@@ -93,7 +93,7 @@ CONSTANTS = {  # file -> names, why
     "events.py": ("PLANNED", "what the solver's tolerance leaves of a closed gap"),
     "plant/kernel/machine.py": ("GAMMA", "coefficient of the integration scheme"),
     "ocp/phases/radau.py": ("RADAU3 _R RADAU5", "coefficients of the integration schemes"),
-    "identify/bench/rig_model.py": ("V_NODES V_MIDDLE", "nodes of a Gauss-Hermite formula"),
+    "identify/bench/prediction.py": ("V_NODES V_MIDDLE", "nodes of a Gauss-Hermite formula"),
     "identify/bench/clocks.py": ("OWNERS", "signs of a rate, by whose clock it is"),
     "identify/answer.py": ("FEW", "what a sentence has room for"),
     "identify/infer/joint.py": (
@@ -130,7 +130,7 @@ CONSTANTS = {  # file -> names, why
     "errors.py": ("LISTED PART FEW", "length of messages"),
     "folders.py": ("PROBE MANY", "free space that a run takes; length of messages"),
     "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
-    "ocp/refinement/sample.py": ("WORST", "violations that a report lists"),
+    "ocp/refinement/start.py": ("WORST", "violations that a report lists"),
     "sweep/farm.py": ("ENVIRONMENT", "environment of workers"),
     "units.py": ("USUAL", "powers and sizes of units"),
 }

@@ -26,8 +26,7 @@ import numpy as np
 from blind import bench, report, study
 from blind.kinds import hidden, kind
 from blind.other_methods import figures_of
-from kemba.identify.bench.forces import FORCE
-from kemba.identify.bench.problem import BenchProblem
+from kemba.identify.bench.problem import FORCE, BenchProblem
 
 ROWS = 400  # of all runs but the last, evenly taken
 UNITS = {"v": "m/s", "x": "m"}
@@ -39,7 +38,7 @@ def runs_of(problem: BenchProblem) -> list[Run]:
     the nominal figures that fit best."""
     found, figures = [], figures_of(problem)
     for i, log in enumerate(problem.logs):
-        expected, variance = problem.predicted.readings(figures, i)[FORCE]
+        expected, variance = problem.readings(figures, i)[FORCE]
         columns = {
             "v": log.motion.v,
             "x": log.motion.x,

@@ -39,7 +39,7 @@ NOTES = (
     "seal; no log of one mounting can show that.",
     "`measured_chambers.gain` is the bore's area, or the scale of the force sensor, over the "
     "nominal one: both are the same in these logs.",
-    "Size of a usual friction (`RigSizeSettings.seal`): it was halved, to 5 N at 25 mm, after a "
+    "Size of a usual friction (`SEAL`): it was halved, to 5 N at 25 mm, after a "
     "first look at these data. With 10 N the constant part of the O-ring was found as well, but "
     "left out as too small to matter.",
     "Intervals of the O-ring by `discover` miss what was read off by hand, and those of "

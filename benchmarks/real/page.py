@@ -34,7 +34,7 @@ them; data that nobody has looked at would.
 |---|---|---|---|"""
 RULES = (
     (
-        "usual friction of a seal (`RigSizeSettings.seal`, at a bore of 25 mm)",
+        "usual friction of a seal (`SEAL`, at a bore of 25 mm)",
         *("10 N", "5 N", "cylinder"),
     ),
     (

@@ -35,6 +35,12 @@ def characterise(
         str, typer.Option(help="Model YAML whose robot has the cylinder that was tested.")
     ] = "planning",
     column_map: Foreign = None,
+    supply: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Supply of logs that do not tell it, such as '0.6 MPa'; may be repeated."
+        ),
+    ] = None,
     paper: Annotated[
         bool, typer.Option("--paper", help="Use the paper's own tables instead of logs.")
     ] = False,
@@ -58,14 +64,15 @@ def characterise(
     from kemba.model import load_model
 
     if load_model(model, rig=True).mechanism.rig:
-        if figure or figures:
-            what = "figures are drawn of the paper's rigs only"
-            raise typer.BadParameter(what, param_hint="--figure")
+        if figure or figures or supply:
+            what = "figures are drawn, and supplies told, of the paper's rigs only"
+            raise typer.BadParameter(what, param_hint="--supply" if supply else "--figure")
         _own_rig(logs, model, out, force, json, quiet, column_map)
         return
+    from kemba.identify.published import as_json
     from kemba.logs import load_map, log_files, open_log
     from kemba.plant.characterise import characterise as fit
-    from kemba.plant.tables import as_json
+    from kemba.quantity import to_si
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
@@ -73,7 +80,11 @@ def characterise(
     folder = _folder(figure, figures, out)
     columns = load_map(column_map) if column_map else None
     read = {str(file): open_log(file, columns) for file in log_files(logs)}
-    found = fit(read, load_model(model, rig=True).mechanism.need_cylinder())
+    try:
+        supplies = [to_si(value, "Pa") for value in supply or []]
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--supply") from None
+    found = fit(read, load_model(model, rig=True).mechanism.need_cylinder(), supplies)
     if out:
         found.write_model(out, out.stem)
     drawn = _draw(found, read, folder, model) if folder else []
@@ -83,6 +94,8 @@ def characterise(
         print_json(answer)
         return
     _print(found)
+    for remark in found.remarks:
+        say(remark)
     for path in drawn:
         say(f"wrote {path}", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
@@ -176,7 +189,7 @@ def _draw(
 def _print(found: Characteristics) -> None:
     from rich.table import Table
 
-    from kemba.plant import tables
+    from kemba.identify import published as tables
 
     for title, columns, rows in (
         ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),

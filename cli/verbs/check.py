@@ -27,13 +27,13 @@ def check(
     Example: kemba-opt check planning.yaml
     """
     from kemba.errors import KembaError
-    from kemba.logs import ENDINGS
+    from kemba.logs import is_log_file
     from kemba_cli.next_steps import after_check, say_next
 
     answers = []
     for file in files:
         try:
-            answer = _log(file, column_map, model) if file.suffix in ENDINGS else _yaml(file)
+            answer = _log(file, column_map, model) if is_log_file(file) else _yaml(file)
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})

@@ -88,9 +88,9 @@ def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Pa
     Raises KembaError where a log does not exist.
     """
     from kemba.errors import KembaError
-    from kemba.logs import log_files
+    from kemba.logs import is_log_file, log_files
 
-    folders = [path for path in runs if path.is_dir() or path.suffix != ".csv"]
+    folders = [path for path in runs if not is_log_file(path)]
     listed: list[Path] = []
     for path in [*logs, *(path for path in runs if path not in folders)]:
         if not path.exists():

@@ -83,7 +83,7 @@ def solve(
     from kemba.ocp.nlp.interrupt import Interrupt
     from kemba.ocp.reading import asked_of
     from kemba.plant.simulate import load_meanwhile
-    from kemba.report.solving import drawer, solve_into
+    from kemba.report.solving import DRAWING, solve_into
     from kemba.runs import RunFolder
     from kemba.solve import Approach, Listener
     from kemba_cli.next_steps import after_solve, say_next
@@ -120,15 +120,14 @@ def solve(
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs, force=force)
     if replay:
-        load_meanwhile()
+        load_meanwhile(*([DRAWING] if figure else []))
     with (
-        drawer(figure) as drawing,
         Progress(quiet or json, SOLVE) as progress,
         Interrupt(lambda text: say(text, quiet)) as stop,
     ):
         listener = Listener(progress.tell, progress.watch, stop)
         approach = Approach(start, starts, jobs, replay, origin, cold, memory)
-        answer = solve_into(folder, resolved, document, listener, approach, figure, drawing)
+        answer = solve_into(folder, resolved, document, listener, approach, figure)
     if json:
         print_json(answer)
     else:

@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import Field, PlainSerializer, PlainValidator, WithJsonSchema, model_validator
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.dimension import check_dimension
-from kemba.effects.formula import check_finite, evaluate, names_of, parse_formula
+from kemba.effects.formula import check_dimension, check_finite, evaluate, names_of, parse_formula
 from kemba.errors import suggest
 from kemba.quantity import Param
 from kemba.units import read_si

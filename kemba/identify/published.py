@@ -1,4 +1,5 @@
-"""What the paper's own tables already tell: friction, a supply that falls short, tube volume.
+"""Tables I and II as text and JSON, beside the paper's; and what the paper's already tell:
+friction, a supply that falls short, tube volume.
 
 Table II gives the steady force of a cylinder of known area at known pressure; what is missing to
 pressure times area is physics that eq. 4 to 7 have no name for. Table I gives how rise times grow
@@ -12,7 +13,117 @@ import numpy as np
 
 from kemba.identify.problem.types import Array
 from kemba.mechanism import Cylinder, load_cylinder
-from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
+from kemba.plant.characterise import Characteristics, Estimate
+
+# Table I, s, at x = 0 and 70 mm
+PAPER_RISE = {"fill": (0.008, 0.025), "vent": (0.013, 0.037)}
+# Table II, N and N s/m, by supply in Pa
+PAPER_FORCE: dict[tuple[str, float], tuple[float, float]] = {
+    ("extend", 0.6e6): (287.0, 91.0),
+    ("extend", 0.7e6): (324.0, 97.0),
+    ("extend", 0.8e6): (349.0, 103.0),
+    ("retract", 0.6e6): (-239.0, 78.0),
+    ("retract", 0.7e6): (-260.0, 84.0),
+    ("retract", 0.8e6): (-291.0, 89.0),
+    ("both", 0.6e6): (41.0, 52.0),
+    ("both", 0.7e6): (50.0, 59.0),
+    ("both", 0.8e6): (55.0, 64.0),
+    ("none", 0.0): (0.0, 25.0),
+}
+PAPER_DEAD_TIME = 0.006  # s
+
+
+def as_json(found: Characteristics) -> dict[str, Any]:
+    """Everything that was found, with the paper's values where it has them."""
+    return {
+        "table_1": [
+            {"chamber": name, "x_m": x, **vars(estimate), "unit": "s", "paper": paper}
+            for name, x, estimate, paper in _rises(found)
+        ],
+        "table_2": [
+            {
+                "mode": line.mode,
+                "supply_pa": line.supply,
+                "F_static": {**vars(line.F_static), "unit": "N", "paper": paper[0]},
+                "c_d": {**vars(line.c_d), "unit": "N.s.m-1", "paper": paper[1]},
+                "r2": line.r2,
+            }
+            for line, paper in _forces(found)
+        ],
+        "dead_time": {
+            name: {**vars(estimate), "unit": "s", "paper": PAPER_DEAD_TIME}
+            for name, estimate in (found.rises.dead.items() if found.rises else ())
+        },
+        "rise_r2": found.rises.r2 if found.rises else None,
+        "bilinear_r2": found.rises.r2_linear if found.rises else None,
+        "check": {name: {"r2": r2, "rms_n": rms} for name, (r2, rms) in found.check.items()},
+        "remarks": list(found.remarks),
+    }
+
+
+RISE_COLUMNS = ("chamber", "x mm", "rise time ms", "+-95 %", "paper")
+FORCE_COLUMNS = (
+    *("mode", "supply MPa", "F_static N", "+-95 %", "paper"),
+    *("c_d N s/m", "+-95 %", "paper", "R2"),
+)
+CHECK_COLUMNS = ("log", "R2", "RMS N")
+
+
+def rise_rows(found: Characteristics) -> list[tuple[str, ...]]:
+    """Table I and the dead times; columns as in `RISE_COLUMNS`."""
+    rows: list[tuple[str, ...]] = [
+        (name, _text(1e3 * x), _text(1e3 * e.value, 1), _width(e, 1e3, 1), _text(1e3 * paper))
+        for name, x, e, paper in _rises(found)
+    ]
+    for name, e in found.rises.dead.items() if found.rises else ():
+        paper = _text(1e3 * PAPER_DEAD_TIME)
+        rows.append((f"dead time {name}", "", _text(1e3 * e.value, 2), _width(e, 1e3, 2), paper))
+    return rows
+
+
+def force_rows(found: Characteristics) -> list[tuple[str, ...]]:
+    """Table II; columns as in `FORCE_COLUMNS`."""
+    rows: list[tuple[str, ...]] = []
+    for line, (force, damping) in _forces(found):
+        F, c = line.F_static, line.c_d
+        left = (line.mode, _text(line.supply / 1e6, 1), _text(F.value), _width(F, 1.0, 1))
+        right = (_text(c.value), _width(c, 1.0, 1), _text(damping), _text(line.r2, 3))
+        rows.append((*left, _text(force), *right))
+    return rows
+
+
+def check_rows(found: Characteristics) -> list[tuple[str, ...]]:
+    """How well the fitted model predicts moving logs; columns as in `CHECK_COLUMNS`."""
+    return [(name, _text(r2, 4), _text(rms, 1)) for name, (r2, rms) in found.check.items()]
+
+
+def _rises(found: Characteristics) -> list[tuple[str, float, Estimate, float]]:
+    if not found.rises:
+        return []
+    return [
+        (name, x, estimate, paper)
+        for name in ("fill", "vent")
+        for x, estimate, paper in zip(
+            (0.0, found.cylinder.stroke), getattr(found.rises, name), PAPER_RISE[name], strict=True
+        )
+    ]
+
+
+def _forces(found: Characteristics) -> list[tuple[Any, tuple[float | None, float | None]]]:
+    return [
+        (line, PAPER_FORCE.get((line.mode, round(line.supply, -3)), (None, None)))
+        for line in found.lines
+    ]
+
+
+def _text(value: float | None, digits: int = 0) -> str:
+    return "" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def _width(e: Estimate, scale: float, digits: int) -> str:
+    """Half the interval; nothing where the data are too few."""
+    return _text(0.5 * scale * (e.high - e.low), digits) if e.low == e.low else ""
+
 
 MADE_ON = "dsnu-25-70"  # the cylinder on which the paper's tables were measured
 LOSS_COLUMNS = ("0.6 MPa", "0.7 MPa", "0.8 MPa")

@@ -17,10 +17,8 @@ from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.infer.colour import with_learnt_colour
 from kemba.identify.infer.windows import error_ratio, free_starts
-from kemba.identify.logs.excerpt import excerpts
-from kemba.identify.logs.gate import BadData, check_logs, sentence
-from kemba.identify.logs.limits import limits_of
-from kemba.identify.logs.reading import read_logs, taken_on
+from kemba.identify.logs.gate import BadData, check_logs, limits_of, sentence
+from kemba.identify.logs.reading import excerpts, read_logs, taken_on
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import Array
 from kemba.logs import load_map

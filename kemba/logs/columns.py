@@ -42,7 +42,10 @@ class ColumnSource(Section):
     sign: Literal[-1, 1] = Field(1, description="-1 where the foreign column counts backwards")
     offset: Number = Field(0.0, description="added last, with a unit: `-90 deg`")
     delay: Annotated[float, Param("s", doc="how late the column is")] = 0.0
-    unwrap: bool = Field(False, description="an angle that begins anew after each turn is joined")
+    unwrap: bool | None = Field(
+        None,
+        description="an angle that begins anew after each turn is joined; by its leaps if unsaid",
+    )
     threshold: Number | None = Field(
         None, description="of a valve: on above it, in the foreign column's unit"
     )

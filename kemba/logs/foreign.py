@@ -12,7 +12,7 @@ from kemba.config import load_yaml
 from kemba.errors import KembaError, map_hint, suggest
 from kemba.logs import times
 from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
-from kemba.logs.formats import READERS, reader
+from kemba.logs.formats import READERS, UNREAD, check_read, reader
 from kemba.logs.recording import Column, Raw, Recording
 from kemba.logs.text import as_numbers, first_row, read_text
 from kemba.quantity import convert
@@ -39,13 +39,15 @@ def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
         hold = times.is_command(header)
         if own is not None:
             values = times.placed(time, own, values, hold)
-            slower.append(str(source.source))
+            slower.append(str(source.names[0]))
         if source.delay:
             values = _earlier(time, values, source.delay, hold)
         found[header] = values
     if slower:
         said.append(times.merged(slower, float(np.median(np.diff(time)))))
-    return Trajectory(time, found, {**raw.meta, **({"read": said} if said else {})})
+    kept = [h.split(" [")[0] for h, s in layout.columns.items() if s.unwrap is False]
+    meta = {"read": said, "kept": kept}
+    return Trajectory(time, found, {**raw.meta, **{k: v for k, v in meta.items() if v}})
 
 
 def unwrapped(values: Array) -> Array:
@@ -185,12 +187,7 @@ class _Reader:
         if wrong.any():
             row, column = int(np.argmax(wrong)), list(self.raw.columns).index(name) + 1
             hint = "`decimal`, `separator` and `skip_below` of the map" if wrong.all() else ""
-            text = isinstance(cells[row], str) and self.path.suffix.lower() in (
-                ".csv",
-                ".txt",
-                ".tsv",
-                ".dat",
-            )
+            text = isinstance(cells[row], str) and self.path.suffix.lower() in TEXTS
             line = row + (first_row(self.path, self.layout) if text else 1)
             where = f"{self.path}:{line}:{column}"
             raise KembaError(where, f"{name}: '{cells[row]}' is not a number", hint=hint)
@@ -213,22 +210,23 @@ def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
 
 TEXTS = (".csv", ".txt", ".tsv", ".dat")
 BINARY = tuple(f".{ending}" for ending in READERS)
-ENDINGS = (*TEXTS, *BINARY)
+ENDINGS = (*TEXTS, *BINARY, *(f".{ending}" for ending in " ".join(UNREAD).split()))
 YAML = (".yaml", ".yml")
 LONGEST = 200  # characters of another program's message
 
 
 def log_files(paths: Iterable[str | Path]) -> list[Path]:
-    """Logs; a folder stands for its CSV files, in the order of their names.
+    """Logs; a folder that is no recording itself stands for its CSV files and the recordings in it,
+    in the order of their names.
 
     Raises KembaError for a folder without any.
     """
     found: list[Path] = []
     for path in map(Path, paths):
-        if not path.is_dir():
+        if not path.is_dir() or is_recorded(path):
             found.append(path)
             continue
-        inside = sorted(path.glob("*.csv"))
+        inside = sorted(p for p in path.iterdir() if p.suffix.lower() == ".csv" or is_recorded(p))
         if not inside:
             hint = "kemba-opt simulate RUN --noise writes some"
             raise KembaError(str(path), "is a folder without logs", "CSV files were expected", hint)
@@ -242,10 +240,8 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
     `strict=False` lets times pass that do not increase. Raises KembaError with the place of the
     first fault, and where foreign columns need a map.
     """
-    if path.is_dir() and not is_recorded(path):
-        raise KembaError(str(path), "is a folder", "a log was expected")
-    _no_yaml(path)
-    if not path.is_dir() and path.suffix.lower() not in BINARY and columns is None:
+    if not path.is_dir() and path.suffix.lower() not in (*BINARY, *YAML) and columns is None:
+        check_read(path)
         return Trajectory.read(path, strict)
     raw = raw_columns(path, columns)
     raw = replace(raw, meta={**raw.meta, **_sidecar(path)})
@@ -260,22 +256,24 @@ def is_recorded(path: Path) -> bool:
     return (path / "metadata.yaml").is_file()
 
 
+def is_log_file(path: Path) -> bool:
+    """Whether a path is that of a log by its ending, be it read or not, or of a recording."""
+    return is_recorded(path) if path.is_dir() else path.suffix.lower() in ENDINGS
+
+
 def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
     """All columns of a file as they are, and the metadata it holds. Raises KembaError."""
     if not path.is_file() and not is_recorded(path):
         raise KembaError(str(path), "is a folder" if path.is_dir() else "no such file")
-    _no_yaml(path)
+    if path.suffix.lower() in YAML:
+        endings = ", ".join((*TEXTS, *BINARY))
+        raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
+    check_read(path)
     if path.is_dir() or path.suffix.lower() in BINARY:
         return _binary(path)
     if layout is None:
         raise KembaError(str(path), "a column map says how to read a text table")
     return Recording(read_text(path, layout))
-
-
-def _no_yaml(path: Path) -> None:
-    if path.suffix.lower() in YAML:
-        endings = ", ".join(ENDINGS)
-        raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
 
 
 def _binary(path: Path) -> Recording:

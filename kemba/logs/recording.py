@@ -20,14 +20,15 @@ OTHER_CLOCK = "log_time"  # of the others, or where a column has that name
 @dataclass(frozen=True)
 class Recording:
     """Columns (n,) by name. `clocks`: for a column with a clock of its own, the column that holds
-    it; without any, all columns are as long. `units` that the file states; `remarks` about what
-    was left out."""
+    it; without any, all columns are as long. `units` that the file states, and the one of all
+    `angles`; `remarks` about what was left out."""
 
     columns: Raw
     meta: Mapping[str, Any] = field(default_factory=dict)
     clocks: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    angles: str = ""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,13 @@ DATE = re.compile(
     r"(?:,? +|T|_)"
 )
 DAY, HOUR = 86_400.0, 3_600.0
+PART = re.compile(
+    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(?P<unit>[a-zµ]+)\s*", re.IGNORECASE
+)
+PARTS = {  # of a duration such as `1 min 2.5 s`, `100ms` or `PT0.1S`, by its first letters
+    "d": DAY, "h": HOUR, "min": 60.0, "m": 60.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "msec": 1e-3,
+    "us": 1e-6, "µs": 1e-6, "usec": 1e-6, "ns": 1e-9, "nsec": 1e-9,
+}  # fmt: skip
 
 
 def seconds(cells: Column) -> Array | None:
@@ -30,7 +37,7 @@ def seconds(cells: Column) -> Array | None:
     """
     texts = [str(cell).strip() for cell in cells]
     known = [text for text in texts if text and text.lower() not in ("nan", "nat", "none")]
-    if len(known) < 2 or not all(":" in text or COMPACT.fullmatch(text) for text in known[:3]):
+    if len(known) < 2 or any(_clock(text) is None for text in known[:3]):
         return None
     found, zones = np.full(len(texts), np.nan), set()
     wrap = 0.0
@@ -55,6 +62,9 @@ def seconds(cells: Column) -> Array | None:
 def _clock(text: str) -> tuple[float, float, str] | None:
     """Seconds, after how many the clock begins anew (0 for a duration), and the time zone."""
     compact = COMPACT.fullmatch(text)
+    if ":" not in text and not compact:
+        duration = _duration(text)
+        return None if duration is None else (duration, 0.0, "")
     if compact:
         hour, minute, second, rest = compact.groups()
         fraction = float("0" + (rest or ".0").replace(",", "."))
@@ -72,6 +82,18 @@ def _clock(text: str) -> tuple[float, float, str] | None:
         return int(days) * DAY + value, 0.0, ""
     value = -value if match["sign"] == "-" else value
     return value, DAY if match["hour"] else HOUR, match["zone"] or ""
+
+
+def _duration(text: str) -> float | None:
+    """Seconds of numbers with units of time, or of ISO 8601's durations; None where it is none."""
+    text = re.sub(r"^P(\d.*)?T", r"\1", text).replace(",", ".")
+    parts = list(PART.finditer(text))
+    units = [PARTS.get(part["unit"].lower()) for part in parts]
+    if "".join(part[0] for part in parts) != text or None in units or not parts:
+        return None
+    return sum(
+        float(part["number"]) * unit for part, unit in zip(parts, units, strict=True) if unit
+    )
 
 
 FULL = 0.9  # share of the rows in which the fastest channel is read, of a table of one rate

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.mechanism.links import Leg
+from kemba.mechanism.planar import Mechanism
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 REACH = 1.0 - 1e-9  # largest cosine of an angle whose slope is still finite
@@ -83,3 +84,16 @@ def leg_per_piston(leg: Leg, x: float) -> float:
     length = ca.sqrt(f**2 + t**2 + 2 * f * t * ca.cos(bend))
     ratio = ca.jacobian(length, bend) / ca.jacobian(extension(leg, bend), bend)
     return float(ca.Function("ratio", [bend], [ratio])(flexion(leg, x)))
+
+
+def felt(mechanism: Mechanism, label: str) -> float:
+    """Speed of an impact per speed at which its gap closes [1].
+
+    `label`: of the pair. A foot counts by itself. A piston at its stop counts by how fast the
+    distance from hip to foot changes there: with bent knees a slow piston goes with a fast body.
+    """
+    pair = label.rpartition("/")[2]
+    places = {"end_stop:retracted": 0.0, "end_stop:extended": mechanism.stroke}
+    if pair not in places:
+        return 1.0
+    return abs(leg_per_piston(mechanism.need_robot().leg, places[pair]))

@@ -102,9 +102,10 @@ class Evidence(Section):
         speed [m/s] of the body, supply [Pa], valve modes. What is not given is not asked."""
         span = self.measured
         found = [
-            _outside(apex, span.apex, "apex", "m"),
-            _outside(speed, span.speed, "speed", "m/s"),
-            _outside(supply, span.supply, "supply", "Pa"),
+            # a log has all that is lower and slower, too
+            _outside(apex, span.apex, "apex", "m", low=False),
+            _outside(speed, span.speed, "speed", "m/s", low=False),
+            _outside(supply, span.supply, "supply", "Pa", low=True),
         ]
         fresh = sorted(set(modes) - set(span.modes)) if span.modes else []
         if fresh:
@@ -112,16 +113,19 @@ class Evidence(Section):
         return [text for text in found if text]
 
 
-def _outside(value: float | None, span: Span | None, name: str, unit: str) -> str:
-    """A sentence where a value lies outside the measured span."""
+def _outside(value: float | None, span: Span | None, name: str, unit: str, low: bool) -> str:
+    """A sentence where a value lies above the measured span, or below it where `low`."""
     if value is None or span is None:
         return ""
-    low, high = span
-    margin = WIDER * max(abs(low), abs(high))
-    if low - margin <= value <= high + margin:
+    margin = WIDER * max(map(abs, span))
+    if value <= span[1] + margin and not (low and value < span[0] - margin):
         return ""
-    measured = f"{short(low)} {unit}" if low == high else f"{short(low)} to {short(high)} {unit}"
-    return f"beyond what was measured: {name} {short(value)} {unit}, the logs have {measured}"
+    told = next((d for d in (2, 3, 4) if short(value, d) not in [short(x, d) for x in span]), 5)
+    measured = " to ".join(dict.fromkeys(short(end, told) for end in span))
+    return (
+        f"beyond what was measured: {name} {short(value, told)} {unit}, "
+        f"the logs have {measured} {unit}"
+    )
 
 
 def write_covariance(path: Path, names: Sequence[str], matrix: Array) -> Path:

@@ -1,4 +1,11 @@
-"""Where the effect states of a model come to rest while its motion and commands are held."""
+"""Effect states of a model: where they come to rest while its motion and commands are held, and how
+they go along a motion and inputs that are given, by the exponential midpoint rule.
+
+It is of second order, exact for a lag of constant input however short, and stable where the states
+are stiff: air that flows between nearly equal pressures answers within a fifth of a millisecond.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
@@ -8,8 +15,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.model.model import Model
-from kemba.model.node import Node
+from kemba.model.model import Model, Node
 from kemba.quantity import Quantity
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -27,24 +33,25 @@ TOLERANCE = 1e-9  # of the integration, in scales of the states
 
 
 class Buffered:
-    """A function of vectors with dense results, called without CasADi's own matrices."""
+    """A function of dense arrays with dense results, called without CasADi's own matrices."""
 
     def __init__(self, function: ca.Function) -> None:
         buffer: Any
         buffer, self._evaluate = function.buffer()
-        self._given = [np.zeros(function.size1_in(i)) for i in range(function.n_in())]
-        flat = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        self._found = [a.reshape(function.size_out(i), order="F") for i, a in enumerate(flat)]
-        for i, given in enumerate(self._given):
-            buffer.set_arg(i, given.data)
-        for i, found in enumerate(flat):
-            buffer.set_res(i, found.data)
+        given = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        found = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        for i, flat in enumerate(given):
+            buffer.set_arg(i, flat.data)
+        for i, flat in enumerate(found):
+            buffer.set_res(i, flat.data)
+        self._given = [a.reshape(function.size_in(i), order="F") for i, a in enumerate(given)]
+        self._found = [a.reshape(function.size_out(i), order="F") for i, a in enumerate(found)]
         self._buffer = buffer  # the evaluation holds no reference to it
 
-    def __call__(self, *vectors: Array) -> list[Array]:
+    def __call__(self, *arrays: Array) -> list[Array]:
         """The results, which hold until the next call."""
-        for given, values in zip(self._given, vectors, strict=True):
-            given[:] = values
+        for given, values in zip(self._given, arrays, strict=True):
+            given[:] = np.reshape(values, given.shape)
         self._evaluate()
         return self._found
 
@@ -119,3 +126,61 @@ def at_rest(model: Model, q: Any, u: Any) -> Array:
 def rate_of(node: Node) -> ca.SX:
     """ds/dt (ns,) of a node, whose rows say sd - ds/dt = 0."""
     return -ca.substitute(node.rate, node.sd, ca.SX.zeros(node.sd.numel()))
+
+
+def midpoint_step(
+    rate: ca.SX, s: ca.SX, inputs: Sequence[ca.SX], given: Sequence[ca.SX], h: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """States (ns,) after a step h [s] from s, and their mean over it, by ds/dt = rate(s, inputs)
+    with the inputs held at `given`, their values in the middle of the step."""
+    f = ca.Function("f", [s, *inputs], [rate, ca.diag(ca.jacobian(rate, s))])
+    middle = s + _grown(h / 2, *f(s, *given))
+    slope, stiff = f(middle, *given)
+    slope = slope - stiff * (middle - s)
+    return s + _grown(h, slope, stiff), s + _mean_growth(h, slope, stiff)
+
+
+def _grown(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
+    """h phi(h stiff) slope with phi(z) = (exp(z) - 1)/z."""
+    z = h * stiff
+    small = ca.fabs(z) < 1e-6
+    return h * slope * ca.if_else(small, 1 + z / 2, (ca.exp(z) - 1) / ca.if_else(small, 1, z))
+
+
+def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
+    """Mean of the growth over the step: h slope (exp(z) - 1 - z)/z^2."""
+    z = h * stiff
+    small = ca.fabs(z) < 1e-3
+    safe = ca.if_else(small, 1, z)
+    return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
+
+
+CHUNK = 512  # steps per call of the compiled function
+
+
+class StatesAlong:
+    """The states of a model's `node`, step by step. `rest`: where they come to rest, by coordinate,
+    its rate and acceleration, inputs and parameters that are held."""
+
+    def __init__(self, model: Model, node: Node) -> None:
+        held, rate = [node.q, node.v, node.a, node.u, node.p], rate_of(node)
+        self.rest = Rest(node.s, held, rate, list(model.states.values()))
+        sizes = [1, *(symbol.numel() for symbol in held[:-1])]
+        self.width = sum(sizes)
+        d = ca.SX.sym("d", self.width)
+        h, *given = ca.vertsplit(d, np.cumsum([0, *sizes]).tolist())
+        after, _ = midpoint_step(rate, node.s, held, [*given, node.p], h)
+        step = ca.Function("step", [node.s, d, node.p], [ca.densify(after)], {"cse": True})
+        self._steps = Buffered(step.mapaccum(CHUNK))
+
+    def run(self, start: Array, given: Array, p: Array) -> Array:
+        """States (ns, n + 1) from `start` (ns,) over n steps, at parameters p (k,). `given`
+        (width, n): length [s] of each step; coordinates, rates, accelerations and inputs in its
+        middle."""
+        n = given.shape[1]
+        given = np.pad(given, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
+        fixed, states = np.repeat(p[:, None], CHUNK, axis=1), [start[:, None]]
+        for i in range(0, given.shape[1], CHUNK):
+            (found,) = self._steps(states[-1][:, -1], given[:, i : i + CHUNK], fixed)
+            states.append(found.copy())
+        return np.concatenate(states, axis=1)[:, : n + 1]

@@ -1,14 +1,68 @@
-"""The plan as a table for the robot's 1 kHz controller (paper, IV-B)."""
+"""The plan as a table for the robot's 1 kHz controller (paper, IV-B).
 
+Valve edges come on its ticks one after the other, so that impulses keep.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
+from math import ceil, floor
 
 import numpy as np
 
 from kemba.model import Model
-from kemba.ocp.edges import ValveEdges, rounded
-from kemba.ocp.phases.modes import OPEN
-from kemba.ocp.phases.notes import LETTERS, PHASE
+from kemba.ocp.phases.modes import LETTERS, OPEN, PHASE
 from kemba.trajectory import Array, Trajectory
+
+SNAP = 1e-6  # ticks; an edge this near to a tick is on it
+
+
+@dataclass(frozen=True)
+class ValveEdges:
+    """A valve's edges in ticks, ascending, the first one opens. `leg`: the one it drives; `force`:
+    the way it pushes, +1 or -1."""
+
+    edges: Sequence[float]
+    leg: int
+    force: float
+
+
+def rounded(valves: Sequence[ValveEdges]) -> list[list[int]]:
+    """The tick of every edge of every valve: as a rule the one before or the one after it.
+
+    An edge that comes a tick late adds or takes one tick of its chamber's force. In order of time,
+    each goes to the tick after which its leg has been pushed too much by the least impulse (error
+    feedback): so pulses and gaps keep their lengths, and a chamber on one side of a piston makes up
+    for the other. Edges keep their order, also between valves, and those of one valve stay a tick
+    apart.
+    """
+    wanted = [_apart(valve.edges) for valve in valves]
+    order = sorted((time, v, k) for v, edges in enumerate(wanted) for k, time in enumerate(edges))
+    ticks: list[list[int]] = [[] for _ in valves]
+    excess = dict.fromkeys((valve.leg for valve in valves), 0.0)  # impulse, in ticks of a chamber
+    earlier, before, latest = -1, -1.0, -1  # latest tick of the times before this one, this one
+    for time, v, k in order:
+        if time > before + SNAP:
+            earlier, before = max(earlier, latest), time
+        sign = valves[v].force * (-1.0 if k % 2 == 0 else 1.0)  # opening late takes, closing adds
+        low = max(earlier, ticks[v][-1] + 1 if ticks[v] else 0)
+        around = {max(low, floor(time + SNAP)), max(low, ceil(time - SNAP))}
+        leg = valves[v].leg
+        errors = {tick: excess[leg] + sign * (tick - time) for tick in sorted(around)}
+        tick = min(errors, key=lambda t: (round(abs(errors[t]), 6), abs(t - time)))
+        excess[leg] = errors[tick]
+        ticks[v].append(tick)
+        latest = max(latest, tick)
+    return ticks
+
+
+def _apart(edges: Sequence[float]) -> list[float]:
+    """The edges of a valve, each at least a tick after the one before."""
+    found: list[float] = []
+    for time in edges:
+        found.append(max(time, found[-1] + 1.0) if found else time)
+    return found
+
 
 PERIOD = 1e-3  # s
 
@@ -21,7 +75,7 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     are the plan's at the tick, because the controller compares them with what it measures there.
     The torque is the mean of the plan over the tick, so that the angular impulse is the plan's.
     Valves are exactly 0 or 1, sent their dead time early, and their edges are rounded to ticks: see
-    `kemba.ocp.edges`.
+    `kemba.ocp.controller`.
     """
     dead = max(max(model.timing(leg)) for leg in model.mechanism.legs)
     lead = int(np.ceil(max(dead, hold) / PERIOD - 1e-9))

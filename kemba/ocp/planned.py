@@ -10,8 +10,7 @@ import numpy as np
 
 from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
-from kemba.ocp.certificate.certify import Certificate, certify
-from kemba.ocp.certificate.objective import costs
+from kemba.ocp.certificate.certify import Certificate, certify, costs
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
@@ -147,6 +146,10 @@ def warnings(plan: Plan) -> list[str]:
     return [f"the motion ends at rest with no foot on the ground: {hint}"]
 
 
+TAKEN = ("solve_s", "solve_cpu_s", "build_s", "iterations", "variables", "constraints")
+RESIDUALS = ("complementarity", "binary", "dynamics", "bounds")
+
+
 def answer(plan: Plan, run: str) -> dict[str, Any]:
     """The JSON of `solve`, also written as certificate.json."""
     trajectory, certificate = plan.trajectory, plan.certificate
@@ -161,32 +164,16 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "feet_m": rise_of_feet(trajectory),
         "duration_s": float(trajectory.time[-1]),
         "cost": plan.cost,
-        "solve_s": plan.solve_s,
-        "solve_cpu_s": plan.solve_cpu_s,
-        "build_s": plan.build_s,
-        "iterations": plan.iterations,
-        "variables": plan.variables,
-        "constraints": plan.constraints,
-        "residuals": {
-            "complementarity": certificate.complementarity,
-            "binary": certificate.binary,
-            "dynamics": certificate.dynamics,
-            "bounds": certificate.bounds,
-        },
-        "replay": None,
-        "table_replay": None,
-        "plant_replay": None,
-        "impacts": None,
+        **{name: getattr(plan, name) for name in TAKEN},
+        "residuals": {name: getattr(certificate, name) for name in RESIDUALS},
+        **dict.fromkeys(("replay", "table_replay", "plant_replay", "impacts")),  # once executed
         "requirements": [measured.json() for measured in certificate.asked],
         "reached": {
             measured.text.removeprefix("goals.").partition(":")[0]: measured.value
             for measured in certificate.asked
             if measured.text.startswith("goals.")
         },
-        "verdict_on": None,
-        "band": None,
-        "robust": None,
-        "strides": None,
+        **dict.fromkeys(("verdict_on", "band", "robust", "strides")),  # the same
         "good": plan.status is Status.SOLVED,
         "continued": plan.continued,
         "start": plan.start,

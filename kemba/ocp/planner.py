@@ -10,15 +10,17 @@ from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.planned import Plan, judge
 from kemba.ocp.relaxation.guess import automatic_guess
-from kemba.ocp.relaxation.lifting import confirm, grow, resumed
 from kemba.ocp.relaxation.schedule import (
     PENALTIES,
     RELAX,
     binary,
+    confirm,
     find,
     fix,
+    grow,
     penalise,
     refine_grid,
+    resumed,
     tighten,
 )
 from kemba.ocp.relaxation.session import Schedule, Session, Stopped

@@ -1,16 +1,23 @@
-"""Reading a task so that all its mistakes are told at once, whatever finds them."""
+"""Reading a task so that all its mistakes are told at once, whatever finds them; and a sequence of
+motions as one problem: grids and contacts in a row, each part at its own times."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from kemba.config import Document, apply_overrides, find_config, load_yaml
+import numpy as np
+
+from kemba.config import Document, apply_overrides, beside, find_config, load_yaml
 from kemba.config.parsing import sound
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import ConfigErrors, KembaError, listed_errors
 from kemba.model import Model, load_model
-from kemba.model.changes import changed_effects
-from kemba.ocp.task.requirement import Requirement
+from kemba.model.spec import changed_effects
+from kemba.ocp.task.moments import spans
+from kemba.ocp.task.requirement import Earlier, Requirement
 from kemba.ocp.task.resolve import resolve
-from kemba.ocp.task.task import Task, parse_task
+from kemba.ocp.task.task import Stance, Task, parse_task
+from kemba.trajectory import Trajectory
 
 
 def load_task(name: str | Path, overrides: list[str] | None = None) -> tuple[Task, Document]:
@@ -90,3 +97,124 @@ def look_up(task: Task, document: Document) -> None:
         except KembaError as error:
             what = f"{key}: {name}: {error.what}"
             raise document.error((key,), what, error.expected, error.hint) from None
+
+
+DEEPEST = 5  # sequences within sequences
+# by a sequence to all its motions
+GIVEN = ("model", "plant", "supply", "payload", "effects", "terrain", "obstacles")
+# what one problem has once, so that all its motions must agree
+ALIKE = (*GIVEN, "cost", "landing", "grip", "min_dwell")
+
+Motion = tuple[Task, Document]
+
+
+def motions(task: Task, document: Document, within: Sequence[str] = ()) -> list[Motion]:
+    """The motions of a sequence in order, repeated ones as often as asked, with their documents.
+
+    Raises KembaError, at the line of the sequence, for a file that is missing or names itself.
+    """
+    found: list[Motion] = []
+    within = within or (document.source,)
+    folder = Path(document.source).parent if document.source else Path()
+    for i, part in enumerate(task.sequence):
+        place = ("sequence", i)
+        try:
+            file = str(find_config(beside(part.motion, folder), "tasks"))
+        except KembaError as error:
+            raise document.error(place, f"sequence: {error.what}", hint=error.hint) from None
+        if file in within or len(within) > DEEPEST:
+            raise document.error(place, f"sequence: {part.motion} leads back to itself")
+        settings = [f"{key}={value}" for key, value in part.set.items()]
+        own = apply_overrides(load_yaml(file), settings)
+        read = read_task(own)
+        given = {key: getattr(task, key) for key in GIVEN if key in task.model_fields_set}
+        read = read.model_copy(update=given)
+        inner = motions(read, own, (*within, file)) if read.sequence else [(read, own)]
+        found += inner * part.repeat
+    return found
+
+
+def as_one(task: Task, document: Document) -> tuple[Task, Model, list[Requirement]]:
+    """A sequence as one task with its model and the requirements of all its motions.
+
+    Each motion begins in the state in which the one before ends. What it asks of places ahead
+    counts from where it begins. Raises KembaError for mistakes in any of the motions.
+    """
+    parts = motions(task, document)
+    nodes, duration = sum(p.nodes for p, _ in parts), sum(p.duration for p, _ in parts)
+    first = parts[0][0]
+    for part, _ in parts[1:]:
+        for key in (key for key in ALIKE if getattr(part, key) != getattr(first, key)):
+            what = f"sequence: `{key}` of {part.name} is another than that of {first.name}"
+            hint = "one problem has one; give it in `set` of the motion, or in both files"
+            raise document.error(("sequence",), what, hint=hint)
+    contacts: list[Stance] = []
+    requirements: list[Requirement] = []
+    begin = 0
+    for part, own in parts:
+        model, asked = asked_of(part, own)
+        requirements += _moved(asked, begin / nodes, part.nodes / nodes)
+        for stance, (a, b) in zip(part.contacts, spans(part.contacts), strict=True):
+            share = (b - a) * part.nodes / nodes
+            if contacts and contacts[-1].on == stance.on:
+                share += contacts.pop().share or 0.0
+            contacts.append(Stance(on=stance.on, share=share))
+        begin += part.nodes
+    whole = {
+        "duration": duration,
+        "nodes": nodes,
+        "step_variation": max(p.step_variation for p, _ in parts),
+        "contacts": tuple(contacts) if all(p.contacts for p, _ in parts) else (),
+        **{key: getattr(first, key) for key in ALIKE},
+    }
+    return task.model_copy(update=whole), model, requirements
+
+
+def _moved(asked: Sequence[Requirement], begin: float, share: float) -> Iterator[Requirement]:
+    """Requirements of a motion that takes a `share` of the nodes from `begin` on."""
+
+    def at(moment: float) -> float:
+        return begin + share * moment
+
+    for r in asked:
+        ahead = begin > 0.0 and r.quantity.name.endswith(AHEAD) and r.minus is None
+        if ahead and r.at == 0.0 and r.quantity.name == "body/x":
+            continue  # where a motion begins
+        minus = r.minus and replace(r.minus, at=at(r.minus.at))
+        if ahead and r.at is not None:
+            minus = Earlier("body/x", begin)
+        moment = None if r.at is None else at(r.at)
+        during = at(r.during[0]), at(r.during[1])
+        yield replace(r, at=moment, during=during, minus=minus)
+
+
+AHEAD = ("body/x", "foot/x", "hip/x", "knee/x")  # what a motion before has moved on
+
+
+def joined(parts: Sequence[Trajectory]) -> Trajectory:
+    """Trajectories in a row, each from where the one before ends: in time and in place.
+
+    Their first and last states agree; of both the earlier is kept. Columns are those of the first.
+    """
+    first = parts[0]
+    time, columns = [first.time], {name: [first[name]] for name in first.names}
+    phases = list(first.meta.get("phases", ()))
+    end, x, nodes = float(first.time[-1]), float(first["body/x"][-1]), len(first) - 1
+    for part in parts[1:]:
+        time.append(part.time[1:] - part.time[0] + end)
+        on = x - float(part["body/x"][0])
+        for name, values in columns.items():
+            values.append(part[name][1:] + on * name.endswith(AHEAD))
+        phases += [_later(str(text), nodes) for text in part.meta.get("phases", ())]
+        end, x = float(time[-1][-1]), float(columns["body/x"][-1][-1])
+        nodes += len(part) - 1
+    whole = dict(zip(first.headers, map(np.concatenate, columns.values()), strict=True))
+    meta = {**first.meta, **({"phases": phases} if phases else {})}
+    return Trajectory(np.concatenate(time), whole, meta)
+
+
+def _later(phase: str, nodes: int) -> str:
+    """A phase of the sidecar, `12-18 ho 10`, some nodes later."""
+    span, rest = phase.split(" ", 1)
+    first, last = span.split("-")
+    return f"{int(first) + nodes}-{int(last) + nodes} {rest}"

@@ -9,8 +9,8 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.events import ends_standing
+from kemba.mechanism.knee import felt
 from kemba.model import Model, load_model
-from kemba.model.impact import felt
 from kemba.model.rest import at_rest
 from kemba.plant.controller import execute
 from kemba.plant.record import Impact

@@ -1,6 +1,6 @@
 """Air and friction of a cylinder from bench logs."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from kemba.model import Model, ModelSpec
 from kemba.plant.commands import Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.rigs import drive, followed
+from kemba.plant.supplies import NOMINAL, tell_supplies
 from kemba.trajectory import Trajectory
 
 
@@ -139,9 +140,8 @@ def _rise(
     level = (force[edge - 1 : stop] - before) / (after - before)
     low, high = (_crossing(time, level, share) for share in (LOW, HIGH))
     dead = low - (high - low) * LOW / (HIGH - LOW)
-    supply = float(log.meta.get("supply", 0.7e6))
     return {
-        "supply": supply,
+        "supply": log.meta.get("supply", NOMINAL),
         "chamber": chamber,
         "time": time,
         "level": level,
@@ -238,7 +238,7 @@ def find_stroke(log: Trajectory) -> Stroke | None:
     if used.sum() < FEWEST:
         return None
     mode = MODES[modes.pop()]
-    supply = 0.0 if mode == "none" else float(log.meta.get("supply", 0.7e6))
+    supply = 0.0 if mode == "none" else log.meta.get("supply", NOMINAL)
     return Stroke(mode, supply, float(v[used].mean()), float(log["piston/F"][used].mean()))
 
 
@@ -271,6 +271,7 @@ class Characteristics:
     lines: list[StrokeLine]
     plateaus: dict[tuple[str, float], Estimate]
     check: dict[str, tuple[float, float]]
+    remarks: tuple[str, ...] = ()
 
     def effects(self) -> tuple[Chamber, ModeDamping, Valve]:
         """The fitted effects; where the logs give nothing the figures of the file are kept."""
@@ -288,11 +289,14 @@ class Characteristics:
         dump_yaml(data, path)
 
 
-def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteristics:
-    """Fit eq. 4 to 7 to bench logs by name, of a cylinder of these dimensions. Raises KembaError
-    when they hold nothing to fit."""
+def characterise(
+    logs: dict[str, Trajectory], cylinder: Cylinder, supplies: Sequence[float] = ()
+) -> Characteristics:
+    """Fit eq. 4 to 7 to bench logs by name, of a cylinder of these dimensions; `supplies` [Pa] of
+    logs that do not tell theirs. Raises KembaError when they hold nothing to fit."""
     for name, log in logs.items():
         _check_columns(name, log)
+    remarks = tell_supplies(logs, supplies)
     rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
     strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
     if not rises and not strokes:
@@ -310,7 +314,7 @@ def characterise(logs: dict[str, Trajectory], cylinder: Cylinder) -> Characteris
             np.ptp(log[f"valve/{chamber}"]) > 0.5 for chamber in ("extend", "retract")
         ):
             check[name] = agreement(predict(cylinder, effects, log), log)
-    return Characteristics(cylinder, table, lines, plateaus, check)
+    return Characteristics(cylinder, table, lines, plateaus, check, remarks)
 
 
 def fitted_effects(
@@ -372,7 +376,7 @@ def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
 
 def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Trajectory:
     """What a `cylinder` with `effects` answers to the motion and the valves of a bench log."""
-    supply = float(log.meta.get("supply", 0.7e6))
+    supply = log.meta.get("supply", NOMINAL)
     model = Model(rig_mechanism(cylinder), effects, supply, "bench")
     valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)

@@ -19,8 +19,7 @@ from kemba.effects.series import Series
 from kemba.errors import KembaError
 from kemba.mechanism import load_robot
 from kemba.model import Model, build_model, load_model, load_spec
-from kemba.model.changes import changed_effects
-from kemba.model.spec import ModelSpec, own_robot
+from kemba.model.spec import ModelSpec, changed_effects, own_robot
 from kemba.plant.certificate import PLANT
 from kemba.plant.commands import scattered
 from kemba.plant.controller import Execution, execute, read_controller
@@ -71,6 +70,14 @@ def lacking(model: str, plant: str) -> list[str]:
     model does not have them either."""
     known = {e.name for e in (*load_spec(model).effects, *_described(load_spec(plant)))}
     return [e.name for e in load_spec(plant).effects if e.name not in known]
+
+
+def carried_over(model: str, payload: float = 0.0) -> list[str]:
+    """What the plant has because the planning model has it, beyond the shipped one: effects that
+    were learnt or added, found lengths, and the task's `payload` [kg]."""
+    plain = {e.name for e in load_spec(PLAIN).effects}
+    added = [e.name for e in load_spec(model).effects if e.moves and e.name not in plain]
+    return [*added, *([f"payload {payload:g} kg"] if payload else [])]
 
 
 def another_robot(model: str, plant: str) -> str | None:

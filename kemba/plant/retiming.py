@@ -4,7 +4,7 @@ Rounding an edge to a tick of 1 ms can move the apex of a light robot by a centi
 rounding is best depends on the whole motion, so the table is simulated with other roundings.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations, product
@@ -89,15 +89,6 @@ def with_moved(
         switched = np.isin(np.arange(len(table)), own)
         columns[f"{name} [{table.unit(name)}]"] = np.asarray(np.cumsum(switched) % 2.0)
     return Trajectory(table.time, columns, table.meta)
-
-
-def neighbours(table: Trajectory) -> Iterator[Trajectory]:
-    """Tables with the same edge of all legs, or one edge, a tick earlier or later."""
-    for group in (*shared_edges(table), *single_edges(table)):
-        for tick in (-1, 1):
-            moved = with_moved(table, [group], [tick])
-            if moved is not None:
-                yield moved
 
 
 class RetimingSettings(Settings):

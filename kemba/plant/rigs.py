@@ -132,18 +132,12 @@ def monotone(knots: Array, x: Array) -> ImposedMotion:
 
     Where it turns round, and at both ends, it rests for a moment.
     """
-    from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+    from scipy.interpolate import PchipInterpolator
 
     v = PchipInterpolator(knots, x)(knots, 1)
     v[[0, -1]] = 0.0
-    spline = CubicHermiteSpline(knots, x, v)
-    rate = spline.derivative()
-
-    def motion(t: Array) -> tuple[Array, Array]:
-        inside = np.clip(t, knots[0], knots[-1])
-        return spline(inside), rate(inside)
-
-    return motion
+    motion = hermite(knots, x, v)
+    return lambda t: motion(np.clip(t, knots[0], knots[-1]))
 
 
 def followed(log: Trajectory) -> ImposedMotion:

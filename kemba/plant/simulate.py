@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
@@ -210,23 +211,25 @@ def _samples(duration: float, sample: float | Array) -> Array:
 _STARTED: list[subprocess.Popen[bytes]] = []  # nobody waits for it: the kernel's lock does
 
 
-def load_meanwhile() -> None:
-    """Begin to import the simulator in a second thread, where there is a core for it; the first
-    time on a machine, also to compile it in a second process.
+def load_meanwhile(*modules: str) -> None:
+    """Begin to import the simulator, then these `modules`, in a second thread, where there is a
+    core for it; the first time on a machine, also to compile it in a second process.
 
     CasADi's solvers leave Python to other threads while they work; this one does not touch CasADi.
     """
     if (os.cpu_count() or 1) > 1 and "numba" not in sys.modules:
-        Thread(target=_load, name="loading").start()
+        Thread(target=_load, args=modules, name="loading").start()
 
 
-def _load() -> None:
+def _load(*modules: str) -> None:
     import kemba.plant.player  # noqa: F401
     from kemba.plant.kernel.jit import FOLDER, is_kept, load
 
     if FOLDER is not None and not is_kept("play"):
         _STARTED.append(_compiler())
     load()
+    for module in modules:
+        import_module(module)
 
 
 def _compiler() -> subprocess.Popen[bytes]:

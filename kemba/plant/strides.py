@@ -9,7 +9,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.events import UPRIGHT
 from kemba.model import Model
-from kemba.ocp.chain import joined
+from kemba.ocp.reading import joined
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.replay import Replay, first_row

@@ -21,6 +21,7 @@ from kemba.plant.characterise import (
     stroke_table,
 )
 from kemba.plant.rigs import bench_model
+from kemba.plant.supplies import NOMINAL
 from kemba.plotting.motion import LOOKS, PANELS, plot_force_velocity
 from kemba.plotting.source import PLAN_FILE, Source
 from kemba.plotting.style import (
@@ -134,7 +135,6 @@ def _place(rise: Rise) -> float:
     return abs(round(2e3 * rise.x) / 2e3)
 
 
-NOMINAL = 0.7e6  # Pa; the pressure at which one figure is drawn of several
 Logs = Mapping[str, Trajectory]
 
 

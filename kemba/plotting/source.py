@@ -14,8 +14,21 @@ from kemba.config import load_yaml
 from kemba.effects.pneumatics.chamber import STEADY, Chamber
 from kemba.effects.pneumatics.tables import at_supply
 from kemba.errors import KembaError
-from kemba.events import STAYS, bridged, gap, runs
-from kemba.logs import ColumnMap, open_log
+from kemba.events import (
+    EXECUTED,
+    MEASURED,
+    PLANNED,
+    STAYS,
+    ContactCourse,
+    Span,
+    bend,
+    bridged,
+    contacts,
+    gap,
+    read,
+    runs,
+)
+from kemba.logs import ColumnMap, is_log_file, open_log
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.quantity import to_si
@@ -75,8 +88,8 @@ def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
     Raises KembaError.
     """
     path = Path(path)
-    file = path / PLAN_FILE if path.is_dir() else path
-    if not file.is_file():
+    file = path / PLAN_FILE if path.is_dir() and not is_log_file(path) else path
+    if not file.exists():
         what = f"has no {PLAN_FILE}" if path.is_dir() else "no such file or folder"
         runs = ", ".join(str(found.parent) for found in sorted(Path("runs").glob(f"*/{PLAN_FILE}")))
         expected = "a run folder or a log was expected"
@@ -186,6 +199,27 @@ class Machine:
         if height is None:
             return np.zeros(len(trajectory), dtype=bool)
         return np.asarray(height < ON_GROUND)
+
+    def course(self, motion: Trajectory) -> ContactCourse:
+        """Its contacts and flights: of an exact motion as it is judged, else as `measured`."""
+        legs, kind = self.mechanism.legs, motion.meta.get("kind")
+        if kind in (None, *EXACT) and all(f"{leg}/foot/z" in motion for leg in legs):
+            reading = EXECUTED if kind == "simulation" else PLANNED
+            return read(motion, reading, self.mechanism.weight)
+        return self.measured(motion)
+
+    def measured(self, motion: Trajectory) -> ContactCourse:
+        """The contacts and flights of a motion, exact or not, as a log tells them: feet stand by
+        force and height, and come down where their height bends."""
+        found: dict[str, list[Span]] = {}
+        for leg in self.mechanism.legs:
+            spans = contacts(motion.time, np.where(self.stance(motion, leg), 0.0, 1.0), PLANNED)
+            height = self.height(motion, leg)
+            if height is not None:
+                begins = [bend(motion.time, height, span.begin) for span in spans]
+                spans = [replace(s, begin=b) for s, b in zip(spans, begins, strict=True)]
+            found[leg] = spans
+        return ContactCourse(motion, motion.time, found, MEASURED)
 
     def feet(self, trajectory: Trajectory) -> Trajectory | None:
         """The motion with the places of its feet and their heights above the ground [m], or None

@@ -6,19 +6,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from kemba.events import (
-    EXECUTED,
-    MEASURED,
-    PLANNED,
     UPRIGHT,
-    ContactCourse,
-    Span,
-    contacts,
     ends_standing,
     gap,
-    read,
     turned,
 )
-from kemba.plotting.source import EXACT, Machine, stance_spans
+from kemba.plotting.source import Machine, stance_spans
 from kemba.report.charts import Book, Chart, Curve, Spans, Track, on_grid, plan_of
 from kemba.trajectory import Trajectory
 
@@ -183,7 +176,7 @@ def events_of(track: Track, machine: Machine, plan: Track | None = None) -> Even
     t = track.t
     if "body/z" not in t or not np.isfinite(t["body/z"]).sum() > 2:
         return None
-    course = _course(track, machine)
+    course = machine.course(t)
     first, flights = float(course.time[0]), course.flights
     tops = (course.apex(flight) for flight in flights)
     return Events(
@@ -195,18 +188,6 @@ def events_of(track: Track, machine: Machine, plan: Track | None = None) -> Even
         {leg: [s.begin for s in spans if not s.firm] for leg, spans in course.contacts.items()},
         _fault(t, machine, plan.t if plan else None),
     )
-
-
-def _course(track: Track, machine: Machine) -> ContactCourse:
-    """Exact motions are read as they are judged; feet of measured ones by force and height."""
-    t, legs = track.t, machine.mechanism.legs
-    if t.meta.get("kind") in EXACT and all(f"{leg}/foot/z" in t for leg in legs):
-        return read(t, PLANNED if track.source.plan else EXECUTED, machine.mechanism.weight)
-    feet: dict[str, list[Span]] = {}
-    for leg in legs:
-        stands = machine.stance(t, leg)
-        feet[leg] = contacts(t.time, np.where(stands, 0.0, 1.0), PLANNED)
-    return ContactCourse(t, t.time, feet, MEASURED)
 
 
 def _feet(t: Trajectory, machine: Machine) -> float | None:

@@ -21,7 +21,7 @@ from kemba.ocp.functions.problem import Program
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.settings import Relaxation
 from kemba.ocp.task.resolve import resolve
-from kemba.ocp.transcription.parameters import Parameters
+from kemba.ocp.transcription.transcribe import Parameters
 from kemba.runs import load_run
 from kemba.sensitivity.replanned import PlanProgram
 from kemba.trajectory import Trajectory

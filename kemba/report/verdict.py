@@ -11,6 +11,7 @@ from typing import Any, Literal
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED
 from kemba.identify.compare.compare import Comparison
+from kemba.identify.compare.words import place_of
 from kemba.report.motion import Events
 from kemba.units import short
 
@@ -143,10 +144,16 @@ def of_logs(
         )
     return ReviewVerdict(
         "fair",
-        _joined([*parts, f"the model does not explain the logs: its error is {ratio}"]),
+        _joined([*parts, f"the model {found.grade} the logs: its error is {ratio}{_where(found)}"]),
         "find what the model lacks:",
         f"kemba-opt discover {words['logs']}",
     )
+
+
+def _where(found: Comparison) -> str:
+    """The condition that stands out most, where any does."""
+    bad = max((c for c in found.bins if c.significant), key=lambda c: c.ratio, default=None)
+    return f"; worst: {place_of(bad)} ({short(bad.ratio)} times)" if bad else ""
 
 
 def of_bad_data(text: str, words: Mapping[str, str]) -> ReviewVerdict:

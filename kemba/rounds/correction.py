@@ -11,7 +11,6 @@ import numpy as np
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
-from kemba.events import MEASURED, read
 from kemba.model import Model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
@@ -33,10 +32,8 @@ class FlownJump:
 
 def flight_of(motion: Trajectory, machine: Machine) -> FlownJump:
     """The highest flight of a motion with body/z, body/pitch and every leg's hip and piston (or
-    knee)."""
-    feet = machine.feet(motion)
-    assert feet is not None  # a log of a robot has these columns
-    course = read(feet, MEASURED)
+    knee). Logs and simulations are read alike, so that their differences are those of the robot."""
+    course = machine.measured(motion)
     if not np.isfinite(course.landing):
         return FlownJump(course.top[1], np.nan, np.nan)
     pitch = motion.get("body/pitch", np.zeros(len(motion)))

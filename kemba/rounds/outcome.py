@@ -112,7 +112,11 @@ def learnt(verdict: str, added: Sequence[str], before: float, after: float) -> s
     goes = f"its error goes from {before:.2f} to {after:.2f} times the noise"
     if not added:
         what = ELSE.get(verdict, "nothing was added to the model")
-        return what if after >= before else f"{what}; with its figures fitted anew {goes}"
+        return (
+            what
+            if round(after, 2) >= round(before, 2)
+            else f"{what}; with its figures fitted anew {goes}"
+        )
     them = "them" if len(added) > 1 else "it"
     if after >= before:
         return f"with {enumerated(added)} added {goes}: the model stays as it is"

@@ -23,8 +23,7 @@ from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
 from kemba.policy.write import FILE, write_policy
 from kemba.runs import Run, load_run
-from kemba.scenarios.conditions import standing
-from kemba.scenarios.draw import Scenario, scenarios
+from kemba.scenarios.draw import Scenario, scenarios, standing
 from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Trajectory

@@ -10,8 +10,7 @@ from kemba.errors import KembaError
 from kemba.model import Model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute_many
-from kemba.scenarios.conditions import standing
-from kemba.scenarios.draw import Scenario
+from kemba.scenarios.draw import Scenario, standing
 from kemba.trajectory import Trajectory
 
 

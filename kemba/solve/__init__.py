@@ -9,15 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from kemba.solve.listener import Listener
-    from kemba.solve.loop import Approach, best_plan
+    from kemba.solve.loop import Approach, Listener, best_plan
 
 __all__ = ["Approach", "Listener", "best_plan"]
 
-_HOMES = {"Approach": "loop", "best_plan": "loop", "Listener": "listener"}
-
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in __all__:
         raise AttributeError(f"module 'kemba.solve' has no attribute '{name}'")
-    return getattr(import_module(f"kemba.solve.{_HOMES[name]}"), name)
+    return getattr(import_module("kemba.solve.loop"), name)

@@ -11,24 +11,65 @@ give the trial of the best score
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
+from kemba.ocp.certificate.certify import objective
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
+from kemba.ocp.finer import dear
+from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
-from kemba.ocp.planning import Planning, spent
-from kemba.ocp.starts import plan_best
-from kemba.solve.listener import Listener
-from kemba.solve.repairs import repaired
-from kemba.solve.trial import Begun, Trial, TrialOrder, executed
+from kemba.ocp.planning import Planning, plan_best, spent
+from kemba.solve.trial import Trial, TrialOrder, executed
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
+
+
+@dataclass(frozen=True)
+class Listener:
+    """What is called at each stage and iteration, and what may ask to stop."""
+
+    tell: Tell = silent
+    watch: Watch | None = None
+    stop: Callable[[], bool] | None = None
+
+
+TICKS = "valve edges on the ticks of the controller"
+
+
+def repaired(first: Trial, planning: Planning, execution: TrialOrder) -> Iterator[Trial]:
+    """The trial, and that with valve edges on ticks where only its table misses, or nearly does, on
+    the plan's own model. A plan that was not refined, or whose time is over, is not repaired."""
+    yield first
+    if first.fine or planning.over or not first.judged or not first.plan.refined:
+        return
+    if first.good or first.table_misses:
+        execution.tell(TICKS)
+        near = _on_ticks(first.plan, planning)
+        if near is not None:
+            yield executed(near, execution, repair=TICKS)
+
+
+def _on_ticks(old: Plan, planning: Planning) -> Plan | None:
+    """The plan with its valve edges on ticks; None where that fails in one step, or where it costs
+    so much more that another guess is likely to cost less."""
+    known = old.trajectory, old.model, old.requirements
+    name = "the earlier plan" if old.continued else "the same plan with edges between ticks"
+    origin = Origin(*known, name, once=True, ticks=True, stages=old.stages)
+    near, _ = planning.continued(origin)
+    if near is None or near.status is not Status.SOLVED:
+        return None
+    before = objective(old.model, old.task, old.requirements, old.trajectory)
+    return None if dear(near, before) else replace(near, continued=old.continued, start=old.start)
+
 
 UNTRIED = "the time limit came before it was executed in any scenario"
 SPENT = ("attempts", "iterations", "solve_s", "solve_cpu_s", "build_s")  # what all trials add to
@@ -76,18 +117,15 @@ def best_plan(
     document: Document,
     approach: Approach,
     listener: Listener,
-    begun: Begun | None = None,
     place: str = "",
 ) -> Trial:
     """The plan of a task, executed and judged: the first good one, or the best of all tried.
 
-    `begun` gets each plan before it is executed, at last the one that is returned. `place`: the
-    run folder in the answer. All of it ends at the task's `solver.time_limit`. Raises KembaError
-    where the task or a file is wrong.
+    `place`: the run folder in the answer. All of it ends at the task's `solver.time_limit`. Raises
+    KembaError where the task or a file is wrong.
     """
     deadline = time.monotonic() + task.solver.time_limit
-    begun = begun or (lambda plan: None)
-    execution = TrialOrder(approach.replay, listener.tell, begun, place)
+    execution = TrialOrder(approach.replay, listener.tell, place)
     planning = _planning(task, document, approach, listener, deadline)
     best = last = None
     for one in _candidates(planning, approach, listener, deadline):
@@ -102,8 +140,6 @@ def best_plan(
         from kemba.solve.robust import with_share
 
         best = with_share(best)
-    if best is not last and best.motions.table is not None:
-        begun(best.plan.trajectory)
     if approach.memory:
         from kemba.solve.memory import best_known
 

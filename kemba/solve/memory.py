@@ -17,7 +17,7 @@ from kemba.errors import KembaError
 from kemba.files import WriteError, atomic_text
 from kemba.model import Model
 from kemba.ocp import Plan, Task
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.task.templates import longest_leg, with_height
 from kemba.solve.earlier import origin_of

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from kemba.errors import KembaError, enumerated
 from kemba.ocp import Plan, controller_table
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
-from kemba.plant.repeat import another_robot, lacking
+from kemba.plant.repeat import another_robot, carried_over, lacking
 from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
 from kemba.solve.judged import Judged, judged
@@ -21,18 +21,16 @@ from kemba.trajectory import Trajectory
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
 
-Begun = Callable[[Trajectory], None]
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
 @dataclass(frozen=True)
 class TrialOrder:
-    """How plans are executed: whether they are at all, who is told, who gets each plan before
-    (`begun`), and the run folder in the answer."""
+    """How plans are executed: whether they are at all, who is told, and the run folder in the
+    answer."""
 
     replay: bool = True
     tell: Tell = silent
-    begun: Begun = lambda plan: None
     place: str = ""
 
 
@@ -116,8 +114,6 @@ def executed(
     result = answer(found, execution.place)
     if table is None and found.attempts:
         table = controller_table(found.model, found.trajectory, found.task.hold)
-    if table is not None:
-        execution.begun(found.trajectory)
     if table is None or not execution.replay or not found.status.plan:
         return Trial(found, result, Motions(table), repair=repair)
     wait_for_compiler(execution.tell)
@@ -148,6 +144,8 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     if without:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
+    if alike := carried_over(task.model, task.payload):
+        names.append(f"the plant has {enumerated(alike)}, too")
     facts = {"verdict_on": done.truth.on, "band": done.band.json() if done.band else None}
     if done.good:
         return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}

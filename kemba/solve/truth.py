@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from kemba.errors import KembaError
+from kemba.errors import KembaError, enumerated
 from kemba.events import peak
 from kemba.files import sha256
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Evidence, Model, load_spec
-from kemba.model.changes import DRAWN, drawn_models
-from kemba.model.spec import evidence_folder
+from kemba.model.spec import DRAWN, drawn_models, evidence_folder
 from kemba.ocp import Plan, Task
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute_many
@@ -81,18 +81,24 @@ def truth_of(task: Task) -> Truth:
         said = "the robot's file has changed since the logs were taken: they do not speak for it"
         return Truth(PLANT, (*remarks, said))
     learnt = {e.name for e in spec.effects if e.support is not None}
+    learnt |= {figure.rsplit(".", 1)[0] for figure in evidence.figures}
     given = task.effects.keys() | ({"payload"} if task.payload else set())
-    changed = sorted(learnt & given)
-    if changed:
-        names = ", ".join(f"`effects.{name}`" for name in changed)
+    if given & learnt:
+        names = _listed(given & learnt)
         said = f"the task changes {names}, which was learnt: the logs do not speak for this model"
         return Truth(PLANT, (*remarks, said))
+    if task.effects:
+        remarks.append(f"beyond what was measured: no log was taken with {_listed(task.effects)}")
     own, plant = evidence.error_held_out, evidence.error_plant
     if own is not None and plant is not None and plant <= own:
         said = f"the simulated robot explains the logs better ({plant:.2f} times the noise) than "
         said += f"the learnt model ({own:.2f}), so its verdict decides"
         return Truth(PLANT, (*remarks, said), evidence)
     return Truth(LEARNT, tuple(remarks), evidence)
+
+
+def _listed(effects: Iterable[str]) -> str:
+    return enumerated([f"`effects.{name}`" for name in sorted(effects)])
 
 
 def beyond(found: Plan, evidence: Evidence) -> list[str]:

@@ -33,7 +33,7 @@ from kemba.errors import KembaError
 from kemba.files import plain, read_json, sha256, write_json
 from kemba.model.spec import load_spec, model_files
 from kemba.quantity import Param
-from kemba.scenarios.conditions import Conditions, Draws
+from kemba.scenarios.draw import Conditions, Draws
 from kemba.stopwatch import Stopwatch
 
 

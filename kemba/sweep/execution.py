@@ -16,8 +16,7 @@ from kemba.plant.controller import Gains, execute, read_controller
 from kemba.plant.repeat import PLAIN, counterpart
 from kemba.plant.replay import Replay
 from kemba.runs import load_run
-from kemba.scenarios.conditions import Conditions, changed_effects, standing, start_offsets
-from kemba.scenarios.draw import sample
+from kemba.scenarios.draw import Conditions, changed_effects, sample, standing, start_offsets
 from kemba.scene import Scene, scene_in
 from kemba.sweep.cases import (
     Case,

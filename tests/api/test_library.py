@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import kemba
-from kemba.api import Executions, Planned
+from kemba.api.planning import Executions, Planned
 from kemba.errors import ConfigErrors, KembaError
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 import kemba
-from kemba.api import Discovered, Planned
+from kemba.api.learning import Discovered
+from kemba.api.planning import Planned
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer
 from kemba.identify.workflow import _searching

@@ -165,7 +165,7 @@ def test_check_tells_the_same_mistakes() -> None:
         (
             "min_dwell=1 s",
             "min_dwell: 1 s is not less than the motion's 0.7 s, so that no valve could open and "
-            "close again; give less, such as 0.01 s",
+            "close again; give less than 0.7 s",
         ),
         (
             "goals.apex.quantity=body/y",

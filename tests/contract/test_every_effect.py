@@ -6,7 +6,7 @@ import pytest
 
 from kemba.contract import CHECKS, Check
 from kemba.contract.cases import Broken, Placed
-from kemba.contract.physics import keeps_the_mirror
+from kemba.contract.check import keeps_the_mirror
 from kemba.effects import BY_KIND, EFFECTS
 
 KINDS = sorted(kind for kind, effect in BY_KIND.items() if effect in EFFECTS)

@@ -8,8 +8,8 @@ import pytest
 from real_data import real
 
 from kemba.effects.pneumatics.switching import pulses
-from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.rig_model import RigModel
+from kemba.identify.bench.bench_log import SmoothedMotion
+from kemba.identify.bench.prediction import RigModel
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 

@@ -11,13 +11,16 @@ from foreign_files import robot_log
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from scipy.io import savemat
+from typer.testing import CliRunner
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, ColumnSource, log_files, open_log
 from kemba.logs.formats import arrays
+from kemba.plotting.source import load_source
 from kemba.report.export import export
 from kemba.trajectory import Trajectory
+from kemba_cli.main import app
 
 ENDINGS = ("parquet", "mcap", "mat", "npz", "json")
 
@@ -257,3 +260,52 @@ def test_a_folder_stands_for_its_logs(tmp_path: Path) -> None:
     assert log_files([alone, tmp_path]) == [alone, tmp_path / "a.csv", tmp_path / "b.csv"]
     with pytest.raises(KembaError, match="is a folder without logs"):
         log_files([tmp_path / "empty"])
+
+
+def test_the_folder_of_a_recording_is_one_log(tmp_path: Path) -> None:
+    """For every verb that takes logs, beside CSV files too."""
+    bag = tmp_path / "logs/bag"
+    bag.mkdir(parents=True)
+    path = export(robot_log(), bag / "bag_0.mcap")
+    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 5}\n")
+    (tmp_path / "logs/a.csv").touch()
+    assert log_files([bag]) == [bag]
+    assert log_files([tmp_path / "logs"]) == [tmp_path / "logs/a.csv", bag]
+    assert np.array_equal(load_source(bag).trajectory["body/z"], open_log(path)["body/z"])
+    for verb in ("check", "discover", "compare", "review"):
+        done = CliRunner().invoke(app, [verb, str(bag), "--map", str(tmp_path / "none.yaml")])
+        assert "none.yaml" in done.stderr and "is a folder" not in done.stderr
+    done = CliRunner().invoke(app, ["check", str(bag)])
+    assert "bag: front/piston/x is off by" in done.stderr  # the log is read and judged
+
+
+@pytest.mark.parametrize(
+    ("name", "what", "way_out"),
+    [
+        ("a.bag", "is a bag of ROS 1", "rosbags-convert"),
+        ("a.hdf5", "is an HDF5 file", "-v7.3"),
+        ("a.XLSX", "is a workbook", "CSV"),
+        ("a.csv.gz", "is packed", "unpack"),
+    ],
+)
+@pytest.mark.parametrize("verb", ["check", "map", "compare"])
+def test_what_is_not_read_is_named_with_the_way_out(
+    verb: str, name: str, what: str, way_out: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_bytes(b"\0\1\2")
+    done = CliRunner().invoke(app, [verb, str(tmp_path / name)])
+    assert f"{name}: {what}" in done.stderr and way_out in done.stderr
+    (tmp_path / "a.foo").write_bytes(b"\0\1\2")
+    with pytest.raises(KembaError, match="is no text, and of no format that is known"):
+        open_log(tmp_path / "a.foo")
+
+
+def test_a_plan_is_told_with_its_run(tmp_path: Path) -> None:
+    columns = {"body/z [m]": np.ones(9)}
+    plan = Trajectory(np.arange(9) * 0.01, columns, {"kind": "plan", "run": "jump-3"})
+    path = export(plan, tmp_path / "x.mcap")
+    with pytest.raises(KembaError, match=r"is a plan, not a log; .* kemba-opt simulate jump-3$"):
+        read_log(path)
+    (tmp_path / "manifest.json").touch()
+    with pytest.raises(KembaError, match=f"kemba-opt simulate {tmp_path}$"):
+        read_log(path)

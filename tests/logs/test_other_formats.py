@@ -146,11 +146,13 @@ def test_lvm(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", ["sto", "mot"])
 def test_opensim(ending: str, tmp_path: Path) -> None:
-    """y is up, z to the side, angles in degrees by the header."""
+    """y is up, z to the side, angles, and these alone, in degrees by the header."""
     t = np.arange(300) * 1e-3
     columns = {
         "pelvis_tx": 0.1 * t, "pelvis_ty": 0.9 + 0.1 * np.sin(9 * t), "pelvis_tz": 1e-3 * t,
         "pelvis_tilt": np.degrees(0.1 * np.sin(8 * t)), "hip_front_q": np.degrees(np.sin(7 * t)),
+        "piston_front_length_x": 0.03 + 0.03 * np.sin(9 * t), "hip_front_torque": 5 * np.sin(t),
+        "piston_front_force": 90 * np.sin(t),
     }  # fmt: skip
     head = ["log", "version=1", "nRows=300", f"nColumns={len(columns) + 1}", "inDegrees=yes",
             "endheader", "\t".join(["time", *columns])]  # fmt: skip
@@ -161,6 +163,9 @@ def test_opensim(ending: str, tmp_path: Path) -> None:
     assert draft.columns["body/z [m]"]["source"] == "pelvis_ty"
     assert draft.columns["body/pitch [rad]"] == {"source": "pelvis_tilt", "unit": "deg"}
     assert draft.columns["front/hip/q [rad]"] == {"source": "hip_front_q", "unit": "deg"}
+    assert draft.columns["front/piston/x [m]"] == {"source": "piston_front_length_x"}
+    assert draft.columns["front/hip/tau [N.m]"] == {"source": "hip_front_torque"}
+    assert draft.columns["front/piston/F [N]"] == {"source": "piston_front_force"}
 
 
 @cache

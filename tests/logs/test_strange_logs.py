@@ -10,7 +10,7 @@ from strange_logs import judged, way, written
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
-from kemba.logs import load_map
+from kemba.logs import ColumnMap, load_map
 from kemba.logs.draft.draft import draft_map
 from kemba.logs.times import seconds
 from kemba.trajectory import Trajectory
@@ -61,6 +61,10 @@ def test_a_stray_quote_is_told_at_its_line(where: str, tmp_path: Path) -> None:
         (["-1 days +23:59:59.700000", "0 days 00:00:00.100000"], 0.4),
         (["20261231T100000.5", "20261231T100001.25"], 0.75),
         (["10:00:00:500", "10:00:01:250"], 0.75),
+        (["0.1 s", "0.25 s"], 0.15),
+        (["100ms", "2e2ms"], 0.1),
+        (["PT0.1S", "PT1M0.2S"], 60.1),
+        (["1h 59 min 59.5 s", "2 h"], 0.5),
     ],
 )
 def test_times_in_words(texts: list[str], expected: float) -> None:
@@ -69,21 +73,36 @@ def test_times_in_words(texts: list[str], expected: float) -> None:
 
 
 @pytest.mark.parametrize(
-    "texts", [["a:b", "c:d"], ["10:00:00+01:00", "10:00:01+02:00"], ["1", "2"]]
+    "texts", [["a:b", "c:d"], ["10:00:00+01:00", "10:00:01+02:00"], ["1", "2"], ["1 V", "2 V"]]
 )
 def test_what_is_no_time_in_words(texts: list[str]) -> None:
     assert seconds(np.array(texts, dtype=object)) is None
 
 
-def test_two_columns_that_fit_as_well_are_a_question(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("column", "names"),
+    [
+        ("front_piston_x", ("front_piston_x_k", "front_piston_x_j")),
+        ("front_piston_x", ("front_piston_lvdt", "front_piston_laser")),
+        ("body_z", ("body_z_mocap", "body_z_laser")),
+        ("body_z", ("body_z", "body_height")),
+        ("body_pitch", ("imu_pitch", "mocap_pitch")),
+        ("front_hip_q", ("front_hip_enc", "front_hip_motor_angle")),
+        ("front_hip_q", ("front_hip_motor_pos", "front_hip_joint_pos")),
+    ],
+)
+def test_two_columns_that_fit_as_well_are_a_question(
+    column: str, names: tuple[str, str], tmp_path: Path
+) -> None:
     log = robot_log()
     table = {"t": log.time, **{n.replace("/", "_"): log[n] for n in log.names}}
-    table["front_piston_x_k"] = table.pop("front_piston_x") + 0.001
-    table["front_piston_x_j"] = table["front_piston_x_k"] + 0.001
+    values = table.pop(column)
+    table |= {names[0]: values, names[1]: values + 0.001}
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
     draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
-    assert "front/piston/x [m]" not in draft.columns and not draft.missing
-    assert any("front_piston_x_k' or 'front_piston_x_j" in text for text in draft.questions)
+    assert not set(names) & {source["source"] for source in draft.columns.values()}
+    assert not draft.missing
+    assert any(f"'{names[0]}' or '{names[1]}'" in text for text in draft.questions)
 
 
 @pytest.mark.parametrize(
@@ -102,6 +121,31 @@ def test_what_names_leave_open_is_asked(name: str, words: str, tmp_path: Path) -
     assert any(words in question for question in draft.questions), draft.questions
 
 
+@pytest.mark.parametrize(
+    ("name", "ticks", "every", "asked"),
+    [
+        ("time", 1e4, 1, True),  # 0.1 ms
+        ("time", 1e7, 1, True),  # 100 ns
+        ("sample", 1e3, 1, False),  # said in the draft; `check` refuses another rate
+        ("", 500, 2, False),
+        ("time", 1 / 60, 1, True),  # min
+        ("time", 1e3, 1, False),
+        ("time", 1e6, 2, False),
+        ("time", 1.0, 10, False),
+    ],
+)
+def test_ticks_that_names_do_not_tell_are_asked(
+    name: str, ticks: float, every: int, asked: bool, tmp_path: Path
+) -> None:
+    """The step between rows tells a unit only where the rate is a usual one in it."""
+    log = robot_log(800).rows(slice(None, None, every))
+    time = log.time * ticks if ticks <= 1 else np.round(log.time * ticks).astype(int)
+    table = {name: time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    assert any("ms apart" in question for question in draft.questions) is asked
+
+
 def test_wrapped_angles_are_joined_and_said(tmp_path: Path) -> None:
     t = np.arange(2000) * 1e-3
     q = 8 * t + 0.3 * np.sin(9 * t)
@@ -116,6 +160,11 @@ def test_wrapped_angles_are_joined_and_said(tmp_path: Path) -> None:
         tmp_path / "other.csv", (), None, "drive", {"axis/q": "rad", "axis/tau": "N.m"}
     )
     assert draft.columns["axis/q [rad]"]["unwrap"] is True
+    for unwrap, angle in ((None, q), (True, q), (False, turned)):
+        columns = {h: {**s, "unwrap": unwrap} for h, s in draft.columns.items()}
+        read = read_log(tmp_path / "other.csv", ColumnMap(kind="drive", columns=columns))
+        assert np.ptp(read["axis/q"] - angle) == pytest.approx(0.0, abs=1e-9)
+        assert ("begins anew" in str(read.meta.get("read"))) is (unwrap is not False)
 
 
 def test_the_pitch_of_a_quaternion(tmp_path: Path) -> None:

@@ -10,9 +10,8 @@ import pytest
 from kemba.config import shipped_configs
 from kemba.errors import KembaError
 from kemba.identify.problem.candidates import link_figures
-from kemba.mechanism.pin_model import build_pin_model
 from kemba.mechanism.recursion import link_forces, read_joints
-from kemba.mechanism.robot import link_regressors, robot_mechanism
+from kemba.mechanism.robot import build_pin_model, link_regressors, robot_mechanism
 from kemba.mechanism.robot_file import load_robot
 from kemba.model import load_model
 

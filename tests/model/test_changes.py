@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.errors import KembaError
-from kemba.model.changes import changed_effects
+from kemba.model.spec import changed_effects
 from kemba.ocp import load_task, task_model
 from kemba.plant.repeat import counterpart, plant_of
 from kemba_cli.main import app

@@ -86,6 +86,8 @@ def test_what_was_not_measured_is_said() -> None:
     assert found.beyond(apex=0.55) == [
         "beyond what was measured: apex 0.55 m, the logs have 0.44 to 0.5 m"
     ]
+    assert not found.beyond(apex=0.4, speed=1.0), "every log has lower and slower places"
+    assert found.beyond(speed=2.249)[0].endswith("speed 2.25 m/s, the logs have 1.9 to 2.2 m/s")
     assert "valve mode 11" in found.beyond(modes=["11"])[0]
     assert not Evidence().beyond(apex=9.0)
 

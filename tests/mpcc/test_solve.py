@@ -13,7 +13,7 @@ from mpcc_set import judged
 import kemba
 from kemba.errors import KembaError
 from kemba.ocp.mpcc.problem import Mpcc
-from kemba.ocp.mpcc.stationary import both_zero, descending, multipliers, pulled
+from kemba.ocp.mpcc.solve import both_zero, descending, multipliers, pulled
 
 x = ca.SX.sym("x", 2)
 CORNER = (x[0] - 1) ** 2 + (x[1] - 1) ** 2

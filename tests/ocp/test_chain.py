@@ -8,9 +8,8 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.ocp import load_task
-from kemba.ocp.chain import joined
 from kemba.ocp.planning import check_feasible
-from kemba.ocp.sequence import as_one, motions
+from kemba.ocp.reading import as_one, joined, motions
 from kemba.ocp.task.requirement import Requirement
 from kemba.trajectory import Trajectory
 

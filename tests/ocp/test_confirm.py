@@ -12,12 +12,11 @@ from kemba.ocp import load_task
 from kemba.ocp.functions.problem import violation
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
-from kemba.ocp.relaxation.lifting import confirm
+from kemba.ocp.relaxation.schedule import confirm
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.task.resolve import resolve
-from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
-from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.transcription.transcribe import Parameters, Transcription
 
 
 def test_a_plan_that_falls_short_on_the_whole_robot_is_solved_there() -> None:

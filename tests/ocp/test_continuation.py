@@ -11,8 +11,7 @@ from kemba.model import load_model
 from kemba.ocp.continuation.continue_plan import with_impacts
 from kemba.ocp.continuation.origin import completed
 from kemba.ocp.nlp.ipopt import Control
-from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.notes import noted_phases, phase_notes
+from kemba.ocp.phases.modes import Phase, noted_phases, phase_notes
 from kemba.ocp.phases.radau import RADAU3
 from kemba.ocp.planning import Planning, plan
 from kemba.ocp.reading import asked_of, load_task

@@ -8,8 +8,7 @@ from kemba.effects import Effect
 from kemba.effects.pneumatics.valve import ValveCloseDelay
 from kemba.model import load_model
 from kemba.ocp import controller_table
-from kemba.ocp.controller import _means
-from kemba.ocp.edges import ValveEdges, rounded
+from kemba.ocp.controller import ValveEdges, _means, rounded
 from kemba.trajectory import Trajectory
 
 LEAD = 0.006  # s

@@ -5,7 +5,7 @@ import pytest
 
 from kemba.ocp import load_task
 from kemba.ocp.reading import asked_of
-from kemba.ocp.relaxation.course import LIFT, in_order
+from kemba.ocp.relaxation.guess import LIFT, in_order
 from kemba.ocp.task.task import Task
 
 STANCES = (

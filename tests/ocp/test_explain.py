@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 
 from kemba.config import find_config
 from kemba.ocp import Task, load_task, task_model
-from kemba.ocp.infeasibility.checks import check_task
+from kemba.ocp.infeasibility.checks import air_work, check_task, inertia_and_weight
 from kemba.ocp.infeasibility.diagnostic import Diagnostic, Relax
-from kemba.ocp.infeasibility.flight import air_work, inertia_and_weight
 from kemba.ocp.task.resolve import resolve
 from kemba_cli.main import app
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.continuation.continue_plan import renoded
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.program import PhaseProgram

@@ -13,7 +13,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement import order_of
-from kemba.ocp.transcription.parameters import Parameters
+from kemba.ocp.transcription.transcribe import Parameters
 
 TURN = ("cost.calm.expression=body/pitch_rate^2", "cost.calm.weight=2")
 

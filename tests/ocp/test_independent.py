@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from kemba.ocp.phases.independent import ContradictionError, Independent
+from kemba.ocp.phases.mode_constraints import ContradictionError, Independent
 
 X, Y = ca.SX.sym("x"), ca.SX.sym("y")
 

@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 
 from kemba.ocp import load_task
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import Planning
-from kemba.ocp.refinement import insertion
-from kemba.ocp.refinement.insertion import Pulse, inserted, pulses, reduced_costs
+from kemba.ocp.refinement import repair
 from kemba.ocp.refinement.refine import Refiner, reduction_of
-from kemba.ocp.refinement.solve import solve, warm
-from kemba.ocp.refinement.start import carried
+from kemba.ocp.refinement.repair import Pulse, inserted, pulses, reduced_costs
+from kemba.ocp.refinement.start import carried, solve, warm
 
 
 @cache
@@ -25,7 +24,7 @@ def without() -> Plan:
     """A jump of 0.71 m at 0.66 MPa, without pulses put in."""
     task, document = load_task("jump.yaml", ["height=0.71 m", "supply=0.66 MPa"])
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(insertion, "FAILS", 0)
+        patch.setattr(repair, "FAILS", 0)
         return next(Planning.of(task, document).plans())
 
 

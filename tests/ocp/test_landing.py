@@ -7,8 +7,8 @@ from ocp.runs import Solved, solved
 from kemba.config import Document, load_yaml
 from kemba.effects.mechanics.ground import GroundCompliance
 from kemba.errors import ConfigErrors, KembaError
+from kemba.mechanism.knee import felt
 from kemba.model import Model, load_model
-from kemba.model.impact import felt
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
 from kemba.ocp.planned import grazes

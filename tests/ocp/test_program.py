@@ -10,8 +10,7 @@ from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.planner import grids
 from kemba.ocp.relaxation.guess import automatic_guess
-from kemba.ocp.relaxation.lifting import widen
-from kemba.ocp.relaxation.schedule import prolong
+from kemba.ocp.relaxation.schedule import prolong, widen
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry, whole
 from kemba.ocp.transcription.transcribe import Transcription

@@ -17,7 +17,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.ocp import load_task, plan, task_model
 from kemba.ocp.nlp.interrupt import Interrupt
-from kemba.ocp.relaxation.lifting import node_groups, resumed
+from kemba.ocp.relaxation.schedule import node_groups, resumed
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription

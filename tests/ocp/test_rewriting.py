@@ -7,9 +7,8 @@ import pytest
 from kemba.model import load_model
 from kemba.ocp import load_task
 from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
-from kemba.ocp.functions.code import FEW, Code, Functions, code_of, vectorised
-from kemba.ocp.functions.proximal import Newton, Proximal, regularised_hessian
-from kemba.ocp.functions.signs import canonical_signs
+from kemba.ocp.functions.code import FEW, Code, Functions, canonical_signs, code_of, vectorised
+from kemba.ocp.functions.problem import Newton, Proximal, regularised_hessian
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription

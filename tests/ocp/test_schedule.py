@@ -10,7 +10,7 @@ from kemba.ocp import load_task, plan
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.planned import Plan
-from kemba.ocp.relaxation.course import body_course
+from kemba.ocp.relaxation.guess import body_course
 from kemba.ocp.relaxation.settings import Ends
 from kemba.ocp.task.resolve import resolve
 from kemba.settings import changed

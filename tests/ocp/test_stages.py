@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.continuation.continue_plan import Continuation
 from kemba.ocp.continuation.origin import Origin, read_stages, write_stages
 from kemba.ocp.nlp.ipopt import Control, Iterate

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from kemba.model import Model, load_model
+from kemba.ocp.continuation.continue_plan import edge_times
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.controller import PERIOD
 from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.ticks import edge_times
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import Planning
 from kemba.ocp.reading import load_task

@@ -14,9 +14,8 @@ from kemba.model import Model
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.symmetry import whole
-from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.transcription.transcribe import Parameters, Transcription
 from kemba.quantity import Quantity
 
 SHARP = {"tol": 1e-10, "constr_viol_tol": 1e-11, "acceptable_iter": 0}

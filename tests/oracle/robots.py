@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from kemba.mechanism import Mechanism, Robot, load_robot, robot_mechanism
-from kemba.mechanism.pin_model import build_pin_model
-from kemba.mechanism.robot import tree_angles
+from kemba.mechanism.robot import build_pin_model, tree_angles
 
 NAMES = ("kemba", "stranger")
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
+from kemba.identify.published import PAPER_FORCE, PAPER_RISE
 from kemba.mechanism import load_cylinder
 from kemba.model import Model, load_model
 from kemba.plant.characterise import Characteristics, characterise
@@ -21,7 +22,6 @@ from kemba.plant.rigs import (
     stroke,
     write_rig,
 )
-from kemba.plant.tables import PAPER_FORCE, PAPER_RISE
 from kemba.trajectory import Trajectory
 
 CYLINDER = load_cylinder("dsnu-25-70")

@@ -10,8 +10,7 @@ from plant.scripts import AIRBORNE, planning
 
 from kemba.effects.mechanics.boom import Boom
 from kemba.mechanism import load_robot, robot_mechanism
-from kemba.mechanism.pin_model import build_pin_model
-from kemba.mechanism.robot import tree_angles
+from kemba.mechanism.robot import build_pin_model, tree_angles
 from kemba.model import Model
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.equations import equations_of

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from kemba.model import Model, load_model
-from kemba.ocp.chain import joined
 from kemba.ocp.controller import controller_table
+from kemba.ocp.reading import joined
 from kemba.plant.certificate import begins_moving, executions, moving_start
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.replay import Replay, first_row, replay

@@ -1,4 +1,4 @@
-"""The figure is the same whoever draws it, and a process that dies is replaced."""
+"""The figure of a plan, and what is loaded only when it is drawn."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.report.solving import FIGURE, Beside, Here, drawer
+from kemba.report.solving import FIGURE, draw_plan
 from kemba.trajectory import Trajectory
 
 
@@ -21,38 +21,14 @@ def plan(tmp_path: Path) -> Trajectory:
     return Trajectory(time, columns, {"kind": "plan"})
 
 
-def test_the_second_process_draws_the_same(plan: Trajectory, tmp_path: Path) -> None:
-    other = tmp_path / "other"
-    other.mkdir()
-    (other / "task.yaml").write_text("model: planning\n", encoding="utf-8")
-    beside, here = Beside(), Here()
-    beside.begin(plan, other)
-    here.begin(plan, tmp_path)
-    here.finish()
-    beside.finish()
-    beside.close()
-    assert (other / FIGURE).read_bytes() == (tmp_path / FIGURE).read_bytes()
-
-
-def test_a_dead_process_is_replaced_and_errors_are_told(plan: Trajectory, tmp_path: Path) -> None:
-    beside = Beside()
-    beside.process.kill()
-    beside.process.join()
-    beside.begin(plan, tmp_path)
-    beside.finish()
+def test_the_figure_of_a_plan_is_written_and_errors_are_told(
+    plan: Trajectory, tmp_path: Path
+) -> None:
+    draw_plan(plan, tmp_path)
     assert (tmp_path / FIGURE).is_file()
     (tmp_path / "taken").write_text("not a folder", encoding="utf-8")
-    beside.begin(plan, tmp_path / "taken")
     with pytest.raises(KembaError, match=r"cannot be written"):
-        beside.finish()
-    beside.close()
-
-
-def test_where_matplotlib_is_loaded_this_process_draws() -> None:
-    import matplotlib  # noqa: F401
-
-    with drawer(True) as drawing:
-        assert type(drawing) is Here
+        draw_plan(plan, tmp_path / "taken")
 
 
 def test_a_plan_needs_neither_matplotlib_nor_what_sweeps_need() -> None:

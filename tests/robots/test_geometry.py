@@ -12,7 +12,7 @@ from kemba.errors import KembaError
 from kemba.mechanism.robot import link_regressors
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec
-from kemba.ocp.infeasibility.flight import inertia_and_weight, leg_swing
+from kemba.ocp.infeasibility.checks import inertia_and_weight, leg_swing
 from kemba.plant.repeat import another_robot, counterpart
 from kemba.sweep.cases import model_hash
 

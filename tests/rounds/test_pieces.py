@@ -12,8 +12,8 @@ from kemba.config import dump_yaml, load_yaml
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer
 from kemba.model import load_model
-from kemba.model.changes import drawn_models
 from kemba.model.evidence import write_covariance
+from kemba.model.spec import drawn_models
 from kemba.ocp import load_task
 from kemba.plotting.source import load_machine
 from kemba.rounds.correction import (

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.scenarios.conditions import Spread
-from kemba.scenarios.draw import drawn, sample
+from kemba.scenarios.draw import Spread, drawn, sample
 from kemba.sweep.cases import SolveBlock
 from kemba.units import read_si
 

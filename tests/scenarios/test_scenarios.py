@@ -9,8 +9,7 @@ import pytest
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.simulate import run
-from kemba.scenarios.conditions import standing
-from kemba.scenarios.draw import load_uncertainties, scenarios
+from kemba.scenarios.draw import load_uncertainties, scenarios, standing
 from kemba.scenarios.share import share
 from kemba.trajectory import Trajectory
 

@@ -12,7 +12,7 @@ from kemba.mechanism.robot_file import robot_files
 from kemba.model import load_spec
 from kemba.model.evidence import write_covariance
 from kemba.ocp import load_task
-from kemba.plant.repeat import counterpart, lacking
+from kemba.plant.repeat import carried_over, counterpart, lacking
 from kemba.solve import Approach, Listener, best_plan
 from kemba.solve.trial import Trial
 from kemba.solve.truth import truth_of
@@ -56,7 +56,10 @@ def test_evidence_decides_whose_verdict_counts(tmp_path: Path) -> None:
     assert truth(model) == ("learnt model", "")
     on, said = truth(model, "effects.supply_scale.k=0.95")
     assert on == "plant" and "`effects.supply_scale`, which was learnt" in said
-    assert truth(model, "effects.contact.mu=0.8") == ("learnt model", "")
+    on, said = truth(model, "effects.contact.mu=0.8")
+    assert on == "learnt model" and "no log was taken with `effects.contact`" in said
+    refitted = learnt(tmp_path, figures={"boom.mass": 1.1})
+    assert truth(refitted, "effects.boom.mass=1 kg")[0] == "plant"
     (tmp_path / "log.csv").unlink()
     on, said = truth(model)
     assert on == "learnt model" and "log.csv is gone" in said
@@ -103,6 +106,17 @@ def test_the_plant_has_the_mechanism_of_the_model(tmp_path: Path, name: str) -> 
     assert name not in {e.name for e in plant.effects}
     assert name in {e.name for e in counterpart("planning").effects}
     assert lacking(str(path), "plant") == [name] and lacking("planning", "plant") == []
+
+
+def test_what_the_plant_has_of_the_plan_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "longer.yaml"
+    found = [
+        {"kind": "geometry", "part": "femur/length", "d": "3 mm"},
+        {"kind": "sensor_bias", "channel": "body/z"},
+    ]
+    dump_yaml({"base": "planning", "effects": found}, path)
+    assert carried_over(str(path), 0.5) == ["geometry:femur/length", "payload 0.5 kg"]
+    assert carried_over("planning") == []
 
 
 def test_what_was_learnt_replaces_the_plants_own_figure(tmp_path: Path) -> None:

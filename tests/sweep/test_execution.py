@@ -5,7 +5,7 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.scenarios.conditions import Conditions, changed_effects, standing, start_offsets
+from kemba.scenarios.draw import Conditions, changed_effects, standing, start_offsets
 from kemba.trajectory import Trajectory
 
 

@@ -76,20 +76,14 @@ class Chamber(Effect):
 
     def evaluate(self, at: At) -> Contribution:
         x = at.piston.x
-        tau_e = at.rise_gain * self.rise_time(at.u_e, x, at.stroke)
-        tau_r = at.rise_gain * self.rise_time(at.u_r, at.stroke - x, at.stroke)
-        F_static_e = at.supply_gain * at_supply(self, "F_extend", at.supply)
-        F_static_r = at.supply_gain * at_supply(self, "F_retract", at.supply)
-        return Contribution(
-            effort={"piston": at.F_e - at.F_r},
-            rate={
-                "F_e": (at.droop * F_static_e * at.u_e - at.F_e) / tau_e,
-                "F_r": (at.droop * F_static_r * at.u_r - at.F_r) / tau_r,
-            },
-            publish={
-                "F_static_e": F_static_e,
-                "F_static_r": F_static_r,
-                "tau_e": tau_e,
-                "tau_r": tau_r,
-            },
-        )
+        sides = {
+            "F_extend": ("e", x, at.u_e, at.F_e),
+            "F_retract": ("r", at.stroke - x, at.u_r, at.F_r),
+        }
+        rate, publish = {}, dict[str, Any]()
+        for table, (c, way, u, F) in sides.items():
+            tau = at.rise_gain * self.rise_time(u, way, at.stroke)
+            static = at.supply_gain * at_supply(self, table, at.supply)
+            rate[f"F_{c}"] = (at.droop * static * u - F) / tau
+            publish |= {f"F_static_{c}": static, f"tau_{c}": tau}
+        return Contribution({"piston": at.F_e - at.F_r}, rate, publish=publish)

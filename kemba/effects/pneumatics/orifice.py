@@ -93,41 +93,27 @@ class OrificeChamber(Effect):
         return (1 - math.exp(-1)) * V * full / (self.n * GAS * TEMPERATURE * choked)
 
     def evaluate(self, at: At) -> Contribution:
-        x, v = at.piston.x, at.piston.v
-        A_e, A_r = at.cylinder.area_extend, at.cylinder.area_retract
-        V_e, V_r = self.value("V_e") + A_e * x, self.value("V_r") + A_r * (at.stroke - x)
+        x, v, bore = at.piston.x, at.piston.v, at.cylinder.bore
         full = at.supply_gain * at_supply(self, "gauge", at.supply)
         P_s = ATMOSPHERE + at.droop * full
         a_fill, a_vent = self.a_fill / at.rise_gain, self.a_vent / at.rise_gain
-        draw_e = at.u_e * mass_flow(a_fill, P_s, at.P_e)
-        draw_r = at.u_r * mass_flow(a_fill, P_s, at.P_r)
-        vent_e = (1 - at.u_e) * mass_flow(a_vent, at.P_e, ATMOSPHERE)
-        vent_r = (1 - at.u_r) * mass_flow(a_vent, at.P_r, ATMOSPHERE)
-        air_e = Air(at.P_e, V_e, A_e * v, draw_e, vent_e, 4 * V_e / at.cylinder.bore + 2 * A_e)
-        air_r = Air(at.P_r, V_r, -A_r * v, draw_r, vent_r, 4 * V_r / at.cylinder.bore + 2 * A_r)
-        F_e, F_r = A_e * (at.P_e - ATMOSPHERE), A_r * (at.P_r - ATMOSPHERE)
-        return Contribution(
-            effort={"piston": F_e - F_r},
-            rate={
-                "P_e": self.rate(at.P_e, V_e, A_e * v, draw_e - vent_e),
-                "P_r": self.rate(at.P_r, V_r, -A_r * v, draw_r - vent_r),
-            },
-            publish={
-                "F_e": F_e,
-                "F_r": F_r,
-                "F_static_e": A_e * full,
-                "F_static_r": A_r * full,
-                "tau_e": self.filling_time(V_e, full, at.rise_gain),
-                "tau_r": self.filling_time(V_r, full, at.rise_gain),
-                "draw_e": draw_e,
-                "draw_r": draw_r,
-                "full": full,
-                "air_e": air_e,
-                "air_r": air_r,
-                "exponent": self.n,
-            },
-            outputs=(
-                (Quantity("chamber/extend/F", "N", doc="extend chamber"), F_e),
-                (Quantity("chamber/retract/F", "N", doc="retract chamber"), F_r),
-            ),
-        )
+        sides = {
+            "extend": ("e", at.cylinder.area_extend, x, v, at.u_e, at.P_e),
+            "retract": ("r", at.cylinder.area_retract, at.stroke - x, -v, at.u_r, at.P_r),
+        }
+        rate, publish, outputs = {}, {"full": full, "exponent": self.n}, []
+        for name, (c, A, way, out, u, P) in sides.items():
+            V, F = self.value(f"V_{c}") + A * way, A * (P - ATMOSPHERE)
+            draw = u * mass_flow(a_fill, P_s, P)
+            vent = (1 - u) * mass_flow(a_vent, P, ATMOSPHERE)
+            rate[f"P_{c}"] = self.rate(P, V, A * out, draw - vent)
+            publish |= {
+                f"F_{c}": F,
+                f"F_static_{c}": A * full,
+                f"tau_{c}": self.filling_time(V, full, at.rise_gain),
+                f"draw_{c}": draw,
+                f"air_{c}": Air(P, V, A * out, draw, vent, 4 * V / bore + 2 * A),
+            }
+            outputs.append((Quantity(f"chamber/{name}/F", "N", doc=f"{name} chamber"), F))
+        effort = {"piston": publish["F_e"] - publish["F_r"]}
+        return Contribution(effort, rate, publish=publish, outputs=outputs)

@@ -1,45 +1,240 @@
-"""One bench log, prepared for prediction."""
+"""One bench log, prepared for prediction: commands, and position and velocity of the imposed motion
+from a noisy, jittering position sensor."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
+from scipy.linalg import toeplitz
 from scipy.ndimage import maximum_filter1d
 
 from kemba.effects.mechanics.piston import V_COULOMB
-from kemba.effects.pneumatics.switching import pulses
-from kemba.identify.bench.motion import SmoothedMotion, smooth_motion
-from kemba.identify.bench.rig_model import Pulses
-from kemba.identify.logs.excerpt import held
-from kemba.identify.logs.limits import LimitSettings
+from kemba.effects.pneumatics.switching import Pulse, pulses
+from kemba.identify.logs.gate import ROW
+from kemba.identify.logs.local_fit import local_fit, weights
+from kemba.identify.logs.reading import held
 from kemba.identify.problem.noise import difference_sigma, telling
-from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.problem.sensor_noise import (
+    ChannelNoise,
+    ColourSettings,
+    Kind,
+    chosen_noise,
+    covariances,
+    pairs,
+    weighted,
+)
 from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
+# How the velocity of an imposed motion is found.
+FINEST = 2e-6  # smallest noise of the position sensor [m]
+# half widths, in samples, of the windows that are tried: each about 1.4 times the one before
+HALF_WIDTHS = (5, 8, 11, 15, 20, 27, 40, 60, 90, 135)
+MEASURED = 0.5  # share of valid readings that a measured velocity needs
+WIDTH = 6  # half width, in samples, of its smoothing
+FINEST_SPEED = 1e-6  # smallest noise of a velocity sensor [m.s-1]
+CONTRADICTS = 3.0  # sigmas by which a measured velocity may differ: three sigmas
+
+
+@dataclass(frozen=True)
+class SmoothedMotion:
+    """x [m], v [m.s-1], a [m.s-2] at `time` (n,) [s], and one sigma of v (n,)."""
+
+    time: Array
+    x: Array
+    v: Array
+    a: Array
+    v_sigma: Array
+    x_sigma: float
+
+
+def smooth_motion(
+    time: Array, x: Array, v: Array | None = None, noise: ChannelNoise | None = None
+) -> SmoothedMotion:
+    """Position and velocity from local cubics, each over the window of least expected error.
+
+    `time`, `x` and `v` are (n,). At rest the window is wide, so that noise does not look like slow
+    motion. In fast motion it is narrow, so that peaks of the velocity are kept. A measured `v`
+    [m.s-1] is averaged with the derived one, by their errors. `noise` of the position sensor, in
+    `difference_sigma` of x; None: white.
+    """
+    good = np.isfinite(x)
+    noise = noise or ChannelNoise()
+    grid, values, step = _even_grid(time, x)
+    sigma = max(difference_sigma(x[good]), FINEST)
+    position, rate, spread = _adaptive(values, sigma, step, noise)
+    if v is not None and np.isfinite(v).sum() > MEASURED * len(v):
+        rate, spread = _weigh_in(grid, rate, spread, time, v)
+    a = np.gradient(_mean(rate, 3), step)
+    x, v, a, spread = (np.interp(time, grid, c) for c in (position, rate, a, spread))
+    return SmoothedMotion(time, x, v, a, spread, sigma * noise.spread)
+
+
+def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
+    """Even times (m,) [s] of about the same step, x (m,) there, and the step [s]; rows without a
+    value are bridged."""
+    good = np.isfinite(x)
+    step = float(np.median(np.diff(time)))
+    count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
+    grid = np.linspace(time[0], time[-1], count)
+    return grid, np.interp(grid, time[good], x[good]), float(grid[1] - grid[0])
+
+
+def _adaptive(
+    values: Array, sigma: float, step: float, colour: ChannelNoise
+) -> tuple[Array, Array, Array]:
+    """Position, rate and its error, over the window that is chosen sample by sample.
+
+    A cubic cannot follow every motion. A quintic in the same window follows more of them. The
+    square of their difference, without the share that noise has in it, estimates the square of the
+    cubic's bias.
+    """
+    n = len(values)
+    best = np.full(n, np.inf)
+    position, rate = values.copy(), np.zeros(n)
+    for width in HALF_WIDTHS:
+        if 2 * width + 1 > n:
+            break
+        x, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
+        finer = local_fit(values, width, step, 5, 1)
+        gain, finer_gain = (_gains(n, width, step, order, colour) for order in (3, 5))
+        noise = (sigma * gain) ** 2
+        bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
+        risk = noise + np.maximum(bias, 0.0)
+        better = risk < best
+        position[better], rate[better] = x[better], v[better]
+        best[better] = risk[better]
+    return position, _mean(rate, 1), np.sqrt(best)
+
+
+def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) -> Array:
+    """1 sigma (n,) [s-1] of the slope of `local_fit` per stated sigma of the values."""
+    gain = _slope_sigma(width, step, order, colour)
+    return np.concatenate([gain[:width], np.full(n - 2 * width, gain[width]), gain[width + 1 :]])
+
+
+@lru_cache(maxsize=256)
+def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> Array:
+    """The same (2 width + 1,) at each place of the window."""
+    slope = weights(width, order, 1)
+    if not colour.lags:
+        return np.asarray(colour.white * np.linalg.norm(slope, axis=1) / step)
+    covariance = toeplitz(colour.covariance(step * np.arange(2.0 * width + 1.0)))
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", slope, slope @ covariance)) / step)
+
+
+def _weigh_in(
+    grid: Array, rate: Array, spread: Array, time: Array, v: Array
+) -> tuple[Array, Array]:
+    """The mean of measured and derived velocity, weighted by their errors.
+
+    Where the two contradict each other, the derived one counts alone.
+    """
+    good = np.isfinite(v)
+    measured = np.interp(grid, time[good], v[good])
+    sigma = max(difference_sigma(v[good]), FINEST_SPEED)
+    smoothed = _mean(measured, WIDTH)
+    sd = np.full(len(grid), sigma / np.sqrt(2 * WIDTH + 1))
+    gap = np.median(np.abs(smoothed - rate) / np.hypot(sd, spread))
+    if gap > CONTRADICTS:
+        return rate, spread
+    weight = spread**2 / (spread**2 + sd**2)
+    return rate + weight * (smoothed - rate), np.sqrt(weight) * sd
+
+
+def _mean(values: Array, width: int) -> Array:
+    """Moving average over 2 width + 1 samples, shrinking at the ends."""
+    kernel = np.ones(2 * width + 1)
+    return np.convolve(values, kernel, "same") / np.convolve(np.ones(len(values)), kernel, "same")
+
+
+# Where the piston rests, and what is believed of the noise there.
+QUIET_WIDTH = 135  # half width, in samples, of the cubic
+REST = 2e-3  # speed up to which the piston rests [m.s-1]
+# largest noise that is believed, in sigmas told from differences of rows: third differences
+# show a tenth of AR(1) noise of 0.98 per row
+MOST = 10.0
+
+
+@dataclass(frozen=True)
+class _Quiet:
+    """One log on an even grid: what the cubic leaves (n,) in sigmas, where it rests, step [s]."""
+
+    left: Array
+    rest: Flags
+    step: float
+
+
+def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
+    """Noise of the position sensor that all `logs` (times [s] and positions [m], both (n,)) share,
+    in each log's `difference_sigma`; white where the piston rests too little to tell."""
+    quiet = [found for time, x in logs if (found := _quiet(time, x)) is not None]
+    settings = ColourSettings
+    if sum(int(q.rest.sum()) for q in quiet) < settings.fewest:
+        return ChannelNoise()
+    n = max(len(q.left) for q in quiet)
+    errors = np.full((n, len(quiet), 1), np.nan)
+    for i, q in enumerate(quiet):
+        errors[: len(q.left), i, 0] = np.where(q.rest, q.left, np.nan)
+    step = float(np.median([q.step for q in quiet]))
+    memories = (0.0, *settings.memories)
+    columns = [_expected(memory, step) for memory in memories]
+    counts = pairs(errors)
+    measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
+    kinds = [Kind(0, memory) for memory in memories]
+    most = np.array([MOST])
+    a, b = weighted(columns, measured, counts)
+    return chosen_noise(a, b, kinds, most, np.array([True]))[0]
+
+
+def _quiet(time: Array, x: Array) -> _Quiet | None:
+    """A log without its motion; None where it is too short."""
+    grid, values, step = _even_grid(time, x)
+    if len(grid) < 2 * QUIET_WIDTH + 1:
+        return None
+    smooth, v = (local_fit(values, QUIET_WIDTH, step, 3, k) for k in (0, 1))
+    rest = maximum_filter1d(np.abs(v), 2 * QUIET_WIDTH + 1) < REST
+    rest[:QUIET_WIDTH] = rest[-QUIET_WIDTH:] = False
+    sigma = max(difference_sigma(x[np.isfinite(x)]), FINEST)
+    return _Quiet((values - smooth) / sigma, rest, step)
+
+
+def _expected(memory: float, step: float) -> Array:
+    """Autocovariances (1, lags) of what the cubic leaves of noise of unit sigma and this memory
+    [s], on an even grid of this `step` [s]."""
+    width, lags = QUIET_WIDTH, np.array(ColourSettings.lags)
+    left = np.eye(1, 4 * width + 1, 2 * width)[0]
+    left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
+    reach = np.convolve(left, left[::-1])
+    apart = np.arange(len(reach)) - len(left) + 1
+    noise = ChannelNoise(0.0, ((1.0, memory),)) if memory else ChannelNoise()
+    found = [reach @ noise.covariance(step * (apart - lag)) for lag in lags]
+    return np.array(found)[None, :]
+
+
+Pulses = tuple[list[Pulse], list[Pulse]]  # of the extend and the retract valve
 PRESSURES = ("chamber/extend/P", "chamber/retract/P")
 
 
-class BenchLogSettings:
-    """How a bench log is prepared."""
-
-    finest_force = 0.2  # smallest noise of the force sensor [N]
-    finest_pressure = 100.0  # smallest noise of a pressure sensor [Pa]
-    finest_share = 5e-4  # noise that is added, as a share of a channel's range
-    gap = 0.012  # longest gap of the position that is bridged [s]
-    # time after which chambers do not depend on the moment of a switching [s]: three times the
-    # slowest rise time of Table I
-    memory = 0.12
-    neighbours = 9  # samples over which the largest error of the velocity counts
-    # usual damping, by which an error of the velocity makes one of the force [N.s.m-1]
-    damping = 60.0
-    # usual friction of a cylinder, in doubt where the direction of motion is in doubt [N]: the
-    # tables of the paper imply 6 to 8 N
-    friction = 10.0
-    creeping = 200.0  # damping that a slow piston has in addition [N.s.m-1]
-    creep = 0.08  # speed up to which it has it [m.s-1]
+# How a bench log is prepared.
+FINEST_FORCE = 0.2  # smallest noise of the force sensor [N]
+FINEST_PRESSURE = 100.0  # smallest noise of a pressure sensor [Pa]
+FINEST_SHARE = 5e-4  # noise that is added, as a share of a channel's range
+GAP = 0.012  # longest gap of the position that is bridged [s]
+# time after which chambers do not depend on the moment of a switching [s]: three times the
+# slowest rise time of Table I
+MEMORY = 0.12
+NEIGHBOURS = 9  # samples over which the largest error of the velocity counts
+# usual damping, by which an error of the velocity makes one of the force [N.s.m-1]
+DAMPING = 60.0
+# usual friction of a cylinder, in doubt where the direction of motion is in doubt [N]: the
+# tables of the paper imply 6 to 8 N
+FRICTION = 10.0
+CREEPING = 200.0  # damping that a slow piston has in addition [N.s.m-1]
+CREEP = 0.08  # speed up to which it has it [m.s-1]
 
 
 @dataclass(frozen=True)
@@ -74,11 +269,10 @@ class BenchLog:
     def velocity_error(self) -> Array:
         """Force error (n,) [N] that the error of the velocity makes, alike for every hypothesis:
         damping, and a friction of usual size where the direction of motion is in doubt."""
-        usual = BenchLogSettings
-        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, usual.neighbours)
+        v, sigma = self.motion.v, maximum_filter1d(self.motion.v_sigma, NEIGHBOURS)
         high, low = np.tanh((v + 2 * sigma) / V_COULOMB), np.tanh((v - 2 * sigma) / V_COULOMB)
-        slope = usual.damping + usual.creeping * np.exp(-((v / usual.creep) ** 2))
-        return np.asarray(slope * self.motion.v_sigma + 0.5 * usual.friction * (high - low))
+        slope = DAMPING + CREEPING * np.exp(-((v / CREEP) ** 2))
+        return np.asarray(slope * self.motion.v_sigma + 0.5 * FRICTION * (high - low))
 
 
 def prepare(
@@ -108,7 +302,7 @@ def prepare(
 def _seen_within(time: Array) -> float:
     """Time [s] between rows where it is so long that valve edges are blurred, else 0."""
     step = float(np.median(np.diff(time)))
-    return step if step > LimitSettings.row else 0.0
+    return step if step > ROW else 0.0
 
 
 def _noise_of(channel: str, y: Array) -> float:
@@ -116,10 +310,9 @@ def _noise_of(channel: str, y: Array) -> float:
 
     It is never below a small least noise, so that simulated logs without any noise can be judged.
     """
-    settings = BenchLogSettings
-    least = settings.finest_force if channel == "piston/F" else settings.finest_pressure
+    least = FINEST_FORCE if channel == "piston/F" else FINEST_PRESSURE
     spread = float(np.ptp(y[np.isfinite(y)]))
-    return max(difference_sigma(y), least + settings.finest_share * spread)
+    return max(difference_sigma(y), least + FINEST_SHARE * spread)
 
 
 def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
@@ -128,12 +321,11 @@ def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
     Where a valve switched within a gap, the moment is not known. The rows after such a gap count
     again when the chambers no longer depend on that moment.
     """
-    settings = BenchLogSettings
     known = np.flatnonzero(good)
-    wide = np.flatnonzero(np.diff(time[known]) > settings.gap)
+    wide = np.flatnonzero(np.diff(time[known]) > GAP)
     hidden = np.zeros(len(time), dtype=bool)
     for begin, end in zip(known[wide], known[wide + 1], strict=True):
         switched = np.any(sent[:, begin] != sent[:, end])
-        after = time[end] + (settings.memory if switched else settings.gap)
+        after = time[end] + (MEMORY if switched else GAP)
         hidden |= (time > time[begin]) & (time < after)
     return hidden

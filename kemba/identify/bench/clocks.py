@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from kemba.identify.bench.bench_log import BenchLog
-from kemba.identify.bench.motion import SmoothedMotion
+from kemba.identify.bench.bench_log import BenchLog, SmoothedMotion
 from kemba.identify.infer.colour import best_fit
 from kemba.identify.infer.linear import Linear, condense, names_of, priors
 from kemba.identify.logs.reading import GateSettings

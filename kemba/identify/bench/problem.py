@@ -1,30 +1,31 @@
 """Bench logs under one model: the force predicted along the imposed motion, as residuals."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from typing_extensions import Self
 
+from kemba.effects.mechanics.piston import V_COULOMB
+from kemba.effects.pneumatics.switching import changes
 from kemba.errors import KembaError
 from kemba.identify.bench import clocks
-from kemba.identify.bench.bench_log import BenchLog, prepare
-from kemba.identify.bench.forces import (
-    bench_force_channel,
-    bench_missing,
-    bench_operating_point,
-    formula_columns,
-    formula_weight,
-    leftover,
-    switchings,
+from kemba.identify.bench.bench_log import (
+    FRICTION,
+    BenchLog,
+    SmoothedMotion,
+    position_noise,
+    prepare,
 )
-from kemba.identify.bench.motion import position_noise
-from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, PredictedLogs, settle_starts
+from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, settle_starts, standardised
 from kemba.identify.bench.validate import contradictions
+from kemba.identify.compare.force_profiles import lags, risen
+from kemba.identify.infer.linear import within
+from kemba.identify.infer.spike_slab import SpikeSlabSettings
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
+from kemba.identify.problem.missing_force import dahl, end_terms, missing_along
 from kemba.identify.problem.noise import ColouredProblem, colours, whiten
 from kemba.identify.problem.types import (
     Array,
@@ -39,6 +40,58 @@ from kemba.identify.problem.types import (
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
+MEMORIES = (0.001, 0.006, 0.02, 0.06, 0.2)  # times for which a switching is remembered [s]
+CREEPS = (0.002, 0.006, 0.015)  # travel over which a hysteresis turns round [m]
+SPEED = 0.3  # speed by which speeds are scaled [m.s-1]
+
+
+def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str, Array]]:
+    """(formula, force per unit coefficient (n,)); `u` (n, 2): share of each valve being on;
+    `stroke` [m]."""
+    x, v, (u_e, u_r) = motion.x, motion.v, u.T
+    sign = np.tanh(v / V_COULOMB)
+    out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
+    yield from end_terms(x, stroke)
+    yield f"x - {stroke / 2:g}", x - stroke / 2
+    yield f"(x - {stroke / 2:g})**2", (x - stroke / 2) ** 2
+    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
+    yield "x*u_e", x * u_e
+    yield "x*u_r", x * u_r
+    yield "max(v, 0)", out
+    yield "max(v, 0)*u_e", out * u_e
+    yield "max(v, 0)*u_r", out * u_r
+    yield "min(v, 0)*u_e", back * u_e
+    yield "min(v, 0)*u_r", back * u_r
+    yield "v*x", v * x
+    yield "v**3", v**3
+    yield f"tanh(v/{V_COULOMB:g})*u_e", sign * u_e
+    yield f"tanh(v/{V_COULOMB:g})*u_r", sign * u_r
+    yield f"tanh(v/{V_COULOMB:g})*x", sign * x
+    yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
+    yield "a", motion.a
+    yield "u_e", u_e
+    yield "u_r", u_r
+    for travel in CREEPS:
+        yield f"dahl(x, {travel:g})", dahl(x, travel)
+
+
+def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
+    """Quantities (n, m) that a missing force could depend on: functions of position and speed,
+    times functions of how long ago each valve was on. `u` (n, 2): share of each valve being on."""
+    from scipy.signal import lfilter  # it takes half a second
+
+    step = float(np.median(np.diff(motion.time)))
+    x, v = motion.x / stroke - 0.5, motion.v / SPEED
+    places = [np.ones(len(x)), x, x**2, v, np.abs(v), v * x, np.tanh(motion.v / V_COULOMB)]
+    histories = [np.ones(len(x)), u[:, 0] * u[:, 1]]
+    for valve in u.T:
+        for memory in MEMORIES:
+            keep = np.exp(-step / memory)
+            histories.append(lfilter([1 - keep], [1, -keep], valve, zi=[keep * valve[0]])[0])
+    return np.stack([p * h for p in places for h in histories], axis=1)
+
+
+FORCE = "piston/F"
 # prior sigma of the bias of a pressure sensor [Pa]: two atmospheres; its zero is the
 # atmosphere's or that of a vacuum
 PRESSURE_ZERO = 2e5
@@ -46,61 +99,66 @@ PRESSURE_ZERO = 2e5
 PRESSURE_GAIN = 0.02
 STEP = 0.1  # step of finite differences of a start, as a share of the state's scale
 REST = 2e-3  # speed below which the piston rests [m.s-1]
+PEAK = 99.5  # percentile of the rows that is taken as the largest [%]
 
 
 class BenchProblem(ColouredProblem):
     """Residuals of bench runs; effects join the model's list when theta switches them on.
 
-    `drift`: whose clock gained on the others before the logs were put on one clock, and its rate.
+    `logs`: the prepared ones, in the order of `runs`. `drift`: whose clock gained on the others
+    before the logs were put on one clock, and its rate. `starts`: name in theta -> (index of the
+    log, name of the state), for every state whose value at the start of a log is free.
     """
 
     def __init__(
         self,
         runs: Iterable[BenchLog],
         model: Model,
-        sensors: bool = True,
         drift: clocks.Drift | None = None,
     ) -> None:
         logs, self.drift = tuple(runs), drift
         self.model = model
         self.runs = tuple(log.name for log in logs)
-        self.candidates = effect_candidates(model)
-        if sensors:
-            self.candidates |= sensor_candidates(_sensor_sigmas(logs), model)
+        self.candidates = effect_candidates(model) | sensor_candidates(_sensor_sigmas(logs), model)
         row = max(log.seen_within for log in logs)
         hidden = {
             n: c for n, c in self.candidates.items() if c.lead.unit == "s" and c.lead.size < row
         }
         self.candidates = {n: c for n, c in self.candidates.items() if n not in hidden}
-        predictor = BenchPredictor(model, self.candidates)
+        predictor = self.predictor = BenchPredictor(model, self.candidates)
+        self.logs = settle_starts(logs, predictor)
         states = predictor.at({}).state_names
-        starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
-        self.predicted = PredictedLogs(settle_starts(logs, predictor), predictor, starts)
+        self.starts = {f"start:{name}[{i}]": (i, name) for i in range(len(logs)) for name in states}
         self.nuisance = predictor.figures | predictor.sensors.nuisance | clocks.nuisance(drift)
         if row:  # of slow logs: times within a row are not known, and not looked for
             late = [SENT_LATE, *(c.key for c in hidden.values() if c.sensor)]
             self.nuisance |= dict.fromkeys(late, (0.0, row / np.sqrt(12.0)))
         self._state_scale = {q.name: q.scale for q in model.states.values()}
-        for key, (_, name) in starts.items():
+        for key, (_, name) in self.starts.items():
             self.nuisance[key] = (0.0, self._state_scale[name])
         for channel in self.channels[1:]:
             self.nuisance[f"sensor_bias:{channel}.b"] = (0.0, PRESSURE_ZERO)
             self.nuisance[f"sensor_scale:{channel}.k"] = (0.0, PRESSURE_GAIN)
 
-    @property
-    def logs(self) -> tuple[BenchLog, ...]:
-        """The prepared logs, in the order of `runs`."""
-        return self.predicted.logs
-
     @cached_property
     def channels(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(c for log in self.logs for c in log.measured))
+
+    def readings(self, theta: Theta, index: int) -> dict[str, tuple[Array, Array]]:
+        """Channel of log `index` -> what should have been measured (n,) and its variance (n,), in
+        the channel's unit."""
+        start = {name: theta.get(key, 0.0) for key, (i, name) in self.starts.items() if i == index}
+        return self.predictor.readings(self.logs[index], theta, start)
+
+    def standardised(self, theta: Theta, index: int) -> dict[str, Array]:
+        """Channel of log `index` -> (predicted - measured) / sigma of its rows, not whitened."""
+        return standardised(self.logs[index], self.readings(theta, index))
 
     def residual(self, theta: Theta) -> Array:
         """Whitened residuals (n,), run by run, then channel by channel."""
         parts = []
         for i in range(len(self.logs)):
-            for channel, r in self.predicted.standardised(theta, i).items():
+            for channel, r in self.standardised(theta, i).items():
                 colour = self.colour.get((i, self.channels.index(channel)))
                 parts.append(r if colour is None else whiten(r, colour))
         return np.concatenate(parts)
@@ -108,17 +166,16 @@ class BenchProblem(ColouredProblem):
     def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """Secants (n, k); the start of a log moves its own rows only."""
         names = list(names)
-        starts = self.predicted.starts
-        plain = [n for n in names if n not in starts]
+        plain = [n for n in names if n not in self.starts]
         columns = dict(zip(plain, super().jacobian(theta, plain).T, strict=True))
-        columns |= self._start_columns(theta, [n for n in names if n in starts])
+        columns |= self._start_columns(theta, [n for n in names if n in self.starts])
         return np.stack([columns[n] for n in names], axis=1)
 
     def _start_columns(self, theta: Theta, names: list[str]) -> dict[str, Array]:
         """Columns (n,) of the initial states: one evaluation moves the starts of all runs."""
         if not names:
             return {}
-        starts, share = self.predicted.starts, STEP
+        starts, share = self.starts, STEP
         at = self.rows().run
         base = self.residual(theta)
         columns: dict[str, Array] = {}
@@ -145,22 +202,61 @@ class BenchProblem(ColouredProblem):
         return Rows(run, channel, time, phase, mode, self.channels, sigma)
 
     def operating_point(self) -> OperatingPoint:
-        """The piston at every row."""
-        return bench_operating_point(self.predicted, self.model.mechanism.stroke)
+        """The piston at every row: imposed motion, and the rod force that the model predicts."""
+        parts = []
+        for i, log in enumerate(self.logs):
+            force, _ = self.readings({}, i)[FORCE]
+            table = np.stack([log.motion.x, log.motion.v, force])
+            parts += [table[:, log.keep[channel]] for channel in log.measured]
+        x, v, force = np.concatenate(parts, axis=1)
+        return OperatingPoint(x, v, force, self.model.mechanism.stroke)
 
     def commands(self) -> Sequence[Changes]:
-        """Per run: valve -> instants and signs of its switchings."""
-        return [switchings(log) for log in self.logs]
+        """Per run: valve -> instants [s] of its commands, and +1 or -1 for on and off."""
+        sides = ("valve/extend", "valve/retract")
+        return [dict(zip(sides, map(changes, log.commands), strict=True)) for log in self.logs]
 
     def force_channels(self) -> list[ForceChannel]:
-        """Where a force may be missing: on the rod."""
-        return [bench_force_channel(self.predicted, self.rows(), self.operating_point())]
+        """Where a force may be missing: on the rod. It shows in the force channel, sample by
+        sample."""
+        rows, at = self.rows(), self.operating_point()
+        force = rows.channel == self.channels.index(FORCE)
+        readings = [self.readings({}, i) for i in range(len(self.logs))]
+        parts = [
+            np.sqrt(variance)[log.keep[channel]]
+            for log, own in zip(self.logs, readings, strict=True)
+            for channel, (_, variance) in own.items()
+        ]
+        sigma = np.concatenate(parts)
+
+        def columns(flags: Array) -> Array:
+            return np.asarray(flags * (force / sigma)[:, None])
+
+        moving = force & (rows.phase == "moving")
+        quantities = {
+            "speed [m/s]": np.where(moving, at.v, np.nan),
+            "position [mm]": np.where(force, 1e3 * at.x, np.nan),
+            "model force [N]": np.where(force, at.force, np.nan),
+        }
+        after = {}
+        for side in ("extend", "retract"):
+            after[side] = np.zeros((len(rows), len(lags()) - 1))
+            for i, sent in enumerate(self.commands()):
+                own = rows.run == i
+                after[side][own] = risen(*sent[f"valve/{side}"], rows.time[own])
+        return [ForceChannel("rod", "N", FRICTION, quantities, columns, after)]
 
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
         """The force that is missing on the rod; `strength` (1,): its 1 sigma [N]."""
-        return bench_missing(self.predicted, theta or {}, strength)
+        found = []
+        for i, log in enumerate(self.logs):
+            expected, variance = self.readings(theta or {}, i)[FORCE]
+            keep = log.keep[FORCE]
+            time, gap = log.motion.time[keep], (log.measured[FORCE] - expected)[keep]
+            found.append(missing_along(log.name, time, gap, variance[keep], (FORCE, "N"), strength))
+        return found
 
     def formulas(self, theta: Theta) -> Mapping[str, Array]:
         """Simple force terms of position, speed and valves: formula -> column (n,).
@@ -169,17 +265,51 @@ class BenchProblem(ColouredProblem):
         """
         if any(log.seen_within for log in self.logs):
             return {}
-        names, columns = formula_columns(self.predicted, theta)
-        return dict(zip(names, self.whiten(columns).T, strict=True))
+        parts: dict[str, list[Array]] = {}
+        for i, log in enumerate(self.logs):
+            forces = dict(terms(*self._along(theta, i)))
+            for channel, (_, variance) in self.readings(theta, i).items():
+                keep = log.keep[channel]
+                for formula, force in forces.items():
+                    column = force if channel == FORCE else np.zeros(len(force))
+                    parts.setdefault(formula, []).append((column / np.sqrt(variance))[keep])
+        columns = np.stack([np.concatenate(p) for p in parts.values()], axis=1)
+        return dict(zip(parts, self.whiten(columns).T, strict=True))
+
+    def _along(self, theta: Theta, index: int) -> tuple[SmoothedMotion, Array, float]:
+        """Of one log: the motion without the position sensor's faults, the share (n, 2) of each
+        sample's neighbourhood in which the valves act, the stroke [m]."""
+        log, predictor = self.logs[index], self.predictor
+        acting = predictor.acting(log, theta)
+        return predictor.true_motion(log, theta), acting, self.model.mechanism.stroke
 
     def weight(self, theta: Theta, formula: str) -> float:
         """Largest force of a formula per unit of its coefficient, as a share of a usual
         friction."""
-        return formula_weight(self.predicted, theta, formula)
+        forces = (dict(terms(*self._along(theta, i)))[formula] for i in range(len(self.logs)))
+        peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
+        return peak / FRICTION
 
     def leftover(self, theta: Theta) -> Leftover:
-        """Force residual, and what a force could depend on."""
-        return leftover(self.predicted, theta, self.candidates)
+        """Force residual over its noise and over what every model leaves, and what it may depend
+        on."""
+        parts = []
+        for i, log in enumerate(self.logs):
+            r = self.standardised(theta, i)[FORCE] / self._imperfection(i)
+            seen = features(*self._along(theta, i))
+            parts.append((r, seen[log.keep[FORCE]], np.full(len(r), i)))
+        residual, columns, run = (np.concatenate(p) for p in zip(*parts, strict=True))
+        return Leftover(residual, columns, run)
+
+    def _imperfection(self, index: int) -> Array:
+        """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
+        be there with a small share of its size."""
+        base = self.standardised({}, index)[FORCE]
+        power, spike = np.ones(len(base)), SpikeSlabSettings.spike
+        for c in self.candidates.values():
+            small = within(self.candidates, {c.key: c.lead.off + spike * c.lead.size})
+            power += (self.standardised(small, index)[FORCE] - base) ** 2
+        return np.asarray(np.sqrt(power))
 
     def drifting(self) -> Self | None:
         """The same problem with sensors that may also drift, by as much as their stated noise."""
@@ -195,9 +325,9 @@ class BenchProblem(ColouredProblem):
 
     def in_detail(self) -> Self:
         """The same problem with nothing read off between rows."""
-        found, predictor = copy(self), copy(self.predicted.predictor)
-        predictor.exact = True
-        found.predicted = replace(self.predicted, predictor=predictor)
+        found = copy(self)
+        found.predictor = copy(self.predictor)
+        found.predictor.exact = True
         return found
 
     def validate(self) -> list[str]:
@@ -211,12 +341,12 @@ class BenchProblem(ColouredProblem):
     @cached_property
     def contradictions(self) -> list[KembaError]:
         """What must be wrong with the columns of the logs."""
-        predictor = self.predicted.predictor
+        stroke = self.model.mechanism.stroke
         return [
             fault
             for log in self.logs
             for fault in contradictions(
-                log, self.model.mechanism.stroke, lambda trial: predictor.predict(trial, {}).force
+                log, stroke, lambda trial: self.predictor.predict(trial, {}).force
             )
         ]
 

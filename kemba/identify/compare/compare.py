@@ -67,6 +67,11 @@ class Comparison:
         return self.noise_ratio <= good and not any(c.significant for c in self.bins)
 
     @property
+    def grade(self) -> str:
+        """How far the model goes, where it is not good."""
+        return "nearly explains" if self.noise_ratio < FAIR else "does not explain"
+
+    @property
     def peaks(self) -> list[Peak]:
         """Per channel the moment at which the missing force stands out most."""
         return peaks(list(self.missing)) if self.missing else []
@@ -191,7 +196,10 @@ def phrase(found: Comparison) -> str:
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
             f"as is usual, and then it would be {short(found.tolerant_ratio)} times."
         )
-    grade = "nearly explains" if found.noise_ratio < FAIR else "does not explain"
     hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
-    parts = [f"The model {grade} the logs: its error is {ratio}", worst, *(h.text for h in hints)]
+    parts = [
+        f"The model {found.grade} the logs: its error is {ratio}",
+        worst,
+        *(h.text for h in hints),
+    ]
     return "; ".join(parts) + "."

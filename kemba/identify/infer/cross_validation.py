@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.linear import Linear
+from kemba.identify.infer.linear import Linear, precision_factor
 from kemba.identify.infer.null_model import LinearisationPoint, effect_bounds
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
@@ -150,9 +150,8 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     ranker = search.base.ranker(linear, spike=settings.none)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
-    h = gram * np.outer(width, width) + np.eye(len(width))
     shift = (linear.mean - linear.at) / width
-    lower = np.linalg.cholesky(h)
+    lower = precision_factor(gram, width)
     target = np.linalg.solve(lower, shift - width * slope)
     reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
     least, most = effect_bounds(search.problem, linear.names, hypothesis)

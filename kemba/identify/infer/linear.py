@@ -63,6 +63,20 @@ class Linear:
         return self.names.index(name)
 
 
+def precision_factor(gram: Array, width: Array) -> Array:
+    """Lower Cholesky factor (k, k) of the posterior's precision in prior widths, W J'J W + 1.
+
+    Where strong columns are nearly alike, J'J (k, k) is rounded by more than the 1 that the prior
+    gives; so much is added then.
+    """
+    scaled = gram * np.outer(width, width) + np.eye(len(width))
+    try:
+        return np.asarray(np.linalg.cholesky(scaled))
+    except np.linalg.LinAlgError:
+        rounding = len(width) * np.finfo(float).eps * scaled.diagonal().max()
+        return np.asarray(np.linalg.cholesky(scaled + rounding * np.eye(len(width))))
+
+
 def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
     """Nuisance, every switch, and the shapes of the effects that are on."""
     shapes = [

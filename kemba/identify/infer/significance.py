@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.answer import DiscoverSettings
 from kemba.identify.infer.colour import best_fit
-from kemba.identify.infer.linear import Linear, time_blocks
+from kemba.identify.infer.linear import Linear, precision_factor, time_blocks
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker, SpikeSlabSettings
 from kemba.identify.problem.types import Array, Labels
@@ -119,7 +119,7 @@ def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
     parts, tolerances = [], SpikeSlabSettings.tolerances
     for tolerance in tolerances:
         width = ranker.widths(hypothesis, tolerance)
-        factor = cho_factor(gram * np.outer(width, width) + np.eye(len(width)), lower=True)
+        factor = precision_factor(gram, width), True
         eta = -width[:, None] * slopes
         step = cho_solve(factor, eta)
         value = 0.5 * np.sum(eta * step, axis=0) - float(np.sum(np.log(np.diag(factor[0]))))
@@ -191,7 +191,7 @@ def left_out_noise(
     scaled = jacobian * width
     order = np.argsort(blocks, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1)
-    root = cholesky(scaled.T @ scaled + np.eye(len(width)), lower=True)
+    root = precision_factor(scaled.T @ scaled, np.ones(len(width)))
     pieces = [root @ _enlarged(scaled[rows], left[rows], root, power) for rows in parts]
     return np.asarray(np.stack(pieces) / width)
 

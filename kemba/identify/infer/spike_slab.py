@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve
 from scipy.special import log_ndtr, logsumexp
 
-from kemba.identify.infer.linear import Linear
+from kemba.identify.infer.linear import Linear, precision_factor
 from kemba.identify.infer.windows import START
 from kemba.identify.problem.types import Array, Candidate, Labels
 
@@ -35,8 +35,7 @@ class Neighbours:
     def of(cls, gram: Array, slope: Array, power: float, shift: Array, width: Array) -> Neighbours:
         """The problem of `Linear` sums under the prior `width` (k,)."""
         eta = shift / width**2 - slope
-        scaled = gram * np.outer(width, width) + np.eye(len(width))
-        lower = np.linalg.cholesky(scaled)
+        lower = precision_factor(gram, width)
         root = np.linalg.solve(lower, np.diag(width))
         covariance = root.T @ root
         step = covariance @ eta
@@ -140,11 +139,8 @@ class Ranker:
         width = self.widths(hypothesis, tolerance)
         precision = 1.0 / width**2
         shift = self.linear.mean - self.linear.at
-        h = self._gram + np.diag(precision)
         eta = precision * shift - self._slope
-        # scaled to unit prior widths, for a well-conditioned factor
-        scaled = h * np.outer(width, width)
-        factor = cho_factor(scaled, lower=True)
+        factor = precision_factor(self._gram, width), True
         step = width * cho_solve(factor, width * eta)
         log_det = 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
         quadratic = self._power + float(precision @ shift**2) - float(eta @ step)

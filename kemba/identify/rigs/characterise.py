@@ -17,9 +17,8 @@ from kemba.effects.base import Effect
 from kemba.errors import KembaError
 from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divisions, half_widths
 from kemba.identify.infer.windows import rms
-from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import read_logs, taken_on
+from kemba.identify.logs.reading import excerpts, read_logs, taken_on
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.problem import rig_problem

@@ -11,11 +11,8 @@ from kemba.identify.problem.candidates import CompiledModels, nominal_figures
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, Filtered, RigLog
-from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
-from kemba.model.rest import Rest, rate_of
-
-CHUNK = 1000  # steps per call of a compiled function
+from kemba.model.rest import StatesAlong
 
 
 class Balance:
@@ -39,16 +36,7 @@ class Balance:
         bends = ca.which_depends(at_rest, node.q, 2, True)[0]
         self._bends = bool(bends)
         self._static = ca.Function("static", symbols, [ca.densify(at_rest)])
-        self._states = len(model.states)
-        if self._states:
-            rate = rate_of(node)
-            self._rest = Rest(node.s, symbols[1:], rate, list(model.states.values()))
-            given = ca.SX.sym("given", 4 + node.u.numel())
-            at = [given[1], given[2], given[3], given[4:], node.p]
-            after, _ = midpoint_step(rate, node.s, symbols[1:], at, given[0])
-            step = ca.Function("step", [node.s, given, node.p], [ca.densify(after)])
-            self._chunk = CHUNK
-            self._step = step.mapaccum(self._chunk)
+        self._states = StatesAlong(model, node) if model.states else None
 
     def force(self, log: Filtered, values: Mapping[str, float]) -> Array:
         """Force (k,) at the judged rows; `values` holds every name of `names`."""
@@ -66,7 +54,7 @@ class Balance:
         p = np.array([values[name] for name in self.names]).reshape(-1, 1)
         u = np.stack([log.others[name] for name in self.inputs])
         rest = np.zeros((1, len(log.q)))
-        s, fixed = np.zeros((self._states, len(log.q))), np.repeat(p, len(log.q), axis=1)
+        s, fixed = np.zeros((len(self.model.states), len(log.q))), np.repeat(p, len(log.q), axis=1)
         read, behind = (
             np.asarray(self._static(s, q[None], rest, rest, u, fixed)).ravel()
             for q in (log.read, log.q)
@@ -77,27 +65,20 @@ class Balance:
         p = np.array([values[name] for name in self.names]).reshape(-1, 1)
         u = np.stack([log.others[name] for name in self.inputs])
         rows = log.rows
-        s = self._along(log, u, p)[:, rows] if self._states else np.zeros((0, len(rows)))
+        s = self._along(log, u, p[:, 0])[:, rows]
         fixed = np.repeat(p, len(rows), axis=1)
         return [s, *(c[None, rows] for c in (log.q, log.v, log.a)), u[:, rows], fixed]
 
     def _along(self, log: Filtered, u: Array, p: Array) -> Array:
         """States (ns, n) along the whole log; each stretch begins at rest."""
-        ends = np.append(log.begins[1:], len(log.time))
+        if self._states is None:
+            return np.zeros((0, len(log.time)))
         parts = []
-        for begin, end in zip(log.begins, ends, strict=True):
+        for begin, end in zip(log.begins, np.append(log.begins[1:], len(log.time)), strict=True):
             own = slice(begin, end)
-            s = self._rest(log.q[begin], 0.0, 0.0, u[:, begin], p)[:, None]
             middle = [0.5 * (c[own][1:] + c[own][:-1]) for c in (log.q, log.v, log.a, *u)]
-            given = np.stack([np.diff(log.time[own]), *middle])
-            count = given.shape[1]
-            given = np.pad(given, ((0, 0), (0, -count % self._chunk)))  # steps of no length
-            fixed = np.repeat(p, self._chunk, axis=1)
-            found = [s]
-            for i in range(0, given.shape[1], self._chunk):
-                block = given[:, i : i + self._chunk]
-                found.append(np.asarray(self._step(found[-1][:, -1:], block, fixed)))
-            parts.append(np.concatenate(found, axis=1)[:, : count + 1])
+            start = self._states.rest(log.q[begin], 0.0, 0.0, u[:, begin], p)
+            parts.append(self._states.run(start, np.stack([np.diff(log.time[own]), *middle]), p))
         return np.concatenate(parts, axis=1)
 
 

@@ -74,8 +74,9 @@ def filtered(
     heavy: float = 0.0,
     known: Mapping[str, float] | None = None,
     turn: float = np.inf,
-) -> Filtered:
-    """The channels of one log, all through one filter.
+) -> Filtered | None:
+    """The channels of one log, all through one filter; None where no stretch without gaps is long
+    enough.
 
     The filter is the narrowest one behind which the rate is known well against `creep` [unit of
     the rate] and the force of the inertia `heavy` well against the other channels. `known`: noise
@@ -112,7 +113,7 @@ def filtered(
         rows.append(count + np.arange(edge, n - edge, width))
         count += n
     if not parts:
-        return _nothing(names)
+        return None
     table = np.concatenate(parts, axis=1)
     sigma = {
         name: GAIN[0] / np.sqrt(width)
@@ -153,14 +154,6 @@ def _stretches(time: Array, longest: float) -> list[tuple[int, int]]:
     cuts = np.flatnonzero(np.diff(time) > longest)
     firsts, lasts = np.append(0, cuts + 1), np.append(cuts, len(time) - 1)
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
-
-
-def _nothing(names: list[str]) -> Filtered:
-    none = np.zeros(0)
-    index = np.zeros(0, dtype=int)
-    empty = dict.fromkeys(names, none)
-    zero = dict.fromkeys(names, 0.0)
-    return Filtered(none, none, none, none, empty, index, 0.0, 0.0, 0.0, zero, 0.0, index, none)
 
 
 ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
@@ -207,7 +200,7 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     others = {n: log[n] for n in names}
     found = filtered(log.time, log[place], others, mechanism.sign_speed, heavy, known, turn)
     name = str(log.meta.get("name", "log"))
-    if not len(found.rows):
+    if found is None or not len(found.rows):
         what = "has no stretch without gaps that is long enough for a rate"
         hint = "log faster, or longer without a break"
         raise BadData([KembaError(str(log.meta.get("path", name)), what, hint=hint)])

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import casadi as ca
 import numpy as np
 
 from kemba.effects.series import Series
@@ -12,10 +11,9 @@ from kemba.identify.problem.candidates import CompiledModels, nominal_figures, s
 from kemba.identify.problem.problem import Problem, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.problem.types import Array, Rows, Theta
-from kemba.identify.rigs.candidates import standing_candidates
-from kemba.model.exponential import midpoint_step
+from kemba.identify.rigs.problem import standing_candidates
 from kemba.model.model import Model
-from kemba.model.rest import rate_of
+from kemba.model.rest import StatesAlong
 from kemba.trajectory import Trajectory
 
 STEPS = 2000  # steps over a log
@@ -26,25 +24,16 @@ class BlowDown:
 
     def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
         self.names = (*free, *scaled)
-        node = model.build(free, scaled)
-        held = [node.q, node.v, node.a, node.u]
-        still = [ca.SX.zeros(x.sparsity()) for x in held]
-        rate = ca.substitute([rate_of(node)], held, still)[0]
-        h = ca.SX.sym("h")
-        after, _ = midpoint_step(rate, node.s, [node.p], [node.p], h)
-        step = ca.Function("step", [node.s, h, node.p], [ca.densify(after)])
-        self._count = STEPS
-        self._steps = step.mapaccum(self._count)
+        self._along = StatesAlong(model, model.build(free, scaled))
 
     def run(
         self, begin: float, end: float, start: Array, values: Mapping[str, float]
     ) -> tuple[Array, Array]:
         """Times (n,) [s] and states (2, n), P [Pa] and T [K], from `start` (2,)."""
-        n, p = self._count, np.array([values[name] for name in self.names]).reshape(-1, 1)
-        h = (end - begin) / n
-        found = np.asarray(self._steps(start, np.full((1, n), h), np.repeat(p, n, axis=1)))
-        states = np.concatenate([np.asarray(start, dtype=float)[:, None], found], axis=1)
-        return np.asarray(begin + h * np.arange(n + 1)), states
+        still = np.zeros((self._along.width, STEPS))
+        still[0] = h = (end - begin) / STEPS
+        states = self._along.run(start, still, np.array([values[name] for name in self.names]))
+        return np.asarray(begin + h * np.arange(STEPS + 1)), states
 
 
 CHANNELS = ("vessel/P", "vessel/T")

@@ -19,38 +19,35 @@ from scipy.ndimage import (
 from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.problem.types import Array, Flags
 
-
-class ContactSettings:
-    """When a foot touches the ground, and when a piston rests at a stop."""
-
-    # height below which a foot may touch [m]: a piston 0.5 mm wrong lifts the foot by 3 mm, a late
-    # encoder by 9 mm
-    may_touch = 9.0e-3
-    level_search = 20e-3  # height of a resting foot that may mean the ground [m]
-    level_time = 0.5  # time over which the ground's reading may wander [s]: half a hop
-    level_rate = 0.03  # vertical speed of a resting foot [m.s-1]
-    level_rows = 20  # rows at rest that give the ground's height
-    stands = 2.5e-3  # height above the ground of a standing foot [m]
-    touches = 1.5e-3  # the same for naming the phase only [m]
-    near_stop = 0.6e-3  # distance from a stop at which a piston may rest on it [m]
-    # the same in sigmas of the reading, where that is more; at most half of `stop_search`: the
-    # extreme readings lie 2.5 sigmas before the stop, others 2.5 behind it
-    stop_noise = 5.0
-    stop_search = 2.5e-3  # distance from an end of the stroke at which the stop may be [m]
-    stop_rows = 4  # extreme readings that are left out
-    blur = 0.003  # time around a contact in which it may be [s]
-    strike = 0.025  # time in which a foot strikes the ground [s]
-    impact = 0.005  # time that is called an impact [s]
-    settled = 0.010  # time in contact before a foot's height is trusted [s]
-    slow_foot = 0.15  # vertical speed of a standing foot [m.s-1]
-    sliding = 0.1  # speed of a foot that slides [m.s-1]
-    sticking = 0.04  # speed of a foot that sticks [m.s-1]
-    slow_body = 0.05  # speed of a body at rest [m.s-1]
-    slow_piston = 0.02  # speed of a piston at rest [m.s-1]
-    firm_load = 15.0  # load of a foot whose sliding friction is judged [N]
-    least_load = 6.0  # load of a foot that is known to stand [N]
-    rate_window = 0.02  # time over which rates are taken [s]
-    steady = 0.008  # time in which the push of a leg may change [s]
+# When a foot touches the ground, and when a piston rests at a stop.
+# height below which a foot may touch [m]: a piston 0.5 mm wrong lifts the foot by 3 mm, a late
+# encoder by 9 mm
+MAY_TOUCH = 9.0e-3
+LEVEL_SEARCH = 20e-3  # height of a resting foot that may mean the ground [m]
+LEVEL_TIME = 0.5  # time over which the ground's reading may wander [s]: half a hop
+LEVEL_RATE = 0.03  # vertical speed of a resting foot [m.s-1]
+LEVEL_ROWS = 20  # rows at rest that give the ground's height
+STANDS = 2.5e-3  # height above the ground of a standing foot [m]
+TOUCHES = 1.5e-3  # the same for naming the phase only [m]
+NEAR_STOP = 0.6e-3  # distance from a stop at which a piston may rest on it [m]
+# the same in sigmas of the reading, where that is more; at most half of STOP_SEARCH: the
+# extreme readings lie 2.5 sigmas before the stop, others 2.5 behind it
+STOP_NOISE = 5.0
+STOP_SEARCH = 2.5e-3  # distance from an end of the stroke at which the stop may be [m]
+STOP_ROWS = 4  # extreme readings that are left out
+BLUR = 0.003  # time around a contact in which it may be [s]
+STRIKE = 0.025  # time in which a foot strikes the ground [s]
+IMPACT = 0.005  # time that is called an impact [s]
+SETTLED = 0.010  # time in contact before a foot's height is trusted [s]
+SLOW_FOOT = 0.15  # vertical speed of a standing foot [m.s-1]
+SLIDING = 0.1  # speed of a foot that slides [m.s-1]
+STICKING = 0.04  # speed of a foot that sticks [m.s-1]
+SLOW_BODY = 0.05  # speed of a body at rest [m.s-1]
+SLOW_PISTON = 0.02  # speed of a piston at rest [m.s-1]
+FIRM_LOAD = 15.0  # load of a foot whose sliding friction is judged [N]
+LEAST_LOAD = 6.0  # load of a foot that is known to stand [N]
+RATE_WINDOW = 0.02  # time over which rates are taken [s]
+STEADY = 0.008  # time in which the push of a leg may change [s]
 
 
 @dataclass(frozen=True)
@@ -89,26 +86,26 @@ def read_schedule(
     `feet` (n, legs, [x, z]) [m], `pistons` (n, legs) [m], `stroke` [m], `body` (n, 3): x, z [m] and
     pitch [rad]; `noise` (legs,): sigma of the pistons' readings [m].
     """
-    limits, dt = ContactSettings, max(float(np.median(np.diff(time))), 1e-4)
+    dt = max(float(np.median(np.diff(time))), 1e-4)
     feet_rate, piston_rate = slope(feet, dt), slope(pistons, dt)
     speed = np.abs(slope(body, dt)).max(axis=1)
-    blur, settle = max(1, round(limits.blur / dt)), max(1, round(limits.settled / dt))
-    near_stop = np.clip(limits.stop_noise * noise, limits.near_stop, limits.stop_search / 2)
+    blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
+    near_stop = np.clip(STOP_NOISE * noise, NEAR_STOP, STOP_SEARCH / 2)
     legs: list[tuple[Any, ...]] = []
     for i in range(feet.shape[1]):
         z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
         level = ground_level(z, vz)
         ground = np.maximum(level, _wandering_level(z, level, dt))
-        near = z < ground + limits.may_touch
-        touches = z < level + limits.touches
+        near = z < ground + MAY_TOUCH
+        touches = z < level + TOUCHES
         may = _dilate(near, blur)
-        slow = np.abs(vz) < limits.slow_foot
-        inner = _erode(z < level + limits.stands, settle) & slow
-        struck = _after(may, limits.strike / dt)
-        on_ground = _erode(z < ground + limits.stands, settle) & slow & ~struck
-        slips = on_ground & (np.abs(vx) > limits.sliding)
+        slow = np.abs(vz) < SLOW_FOOT
+        inner = _erode(z < level + STANDS, settle) & slow
+        struck = _after(may, STRIKE / dt)
+        on_ground = _erode(z < ground + STANDS, settle) & slow & ~struck
+        slips = on_ground & (np.abs(vx) > SLIDING)
         slides = np.where(slips, np.sign(vx), 0.0)
-        slow_piston = np.abs(piston_rate[:, i]) < limits.slow_piston
+        slow_piston = np.abs(piston_rate[:, i]) < SLOW_PISTON
         bottom, top = _stop_levels(pistons[slow_piston, i], stroke)
         at_low = _closed(pistons[:, i] < bottom + near_stop[i], settle)
         at_high = _closed(pistons[:, i] > top - near_stop[i], settle)
@@ -122,19 +119,19 @@ def read_schedule(
                 _dilate(at_low, 2),
                 _dilate(at_high, 2),
                 rests,
-                _erode(np.abs(vx) < limits.sticking, settle // 2),
+                _erode(np.abs(vx) < STICKING, settle // 2),
                 touches,
-                _dilate(_after(touches, 1), round(limits.impact / dt)),
+                _dilate(_after(touches, 1), round(IMPACT / dt)),
             )
         )
     *parts, touches, impact = (np.stack(part, axis=1) for part in zip(*legs, strict=True))
     may, settled, struck, slides, low, high, rests, sticks = parts
-    hit = [_after(at_stop, limits.strike / dt) for at_stop in (low | high).T]
+    hit = [_after(at_stop, STRIKE / dt) for at_stop in (low | high).T]
     # an impact shakes all loads: what a foot carries then is not known well enough to be judged
     slides[struck.any(axis=1) | np.any(hit, axis=0)] = 0.0
     count = touches.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
-    phase[(count == feet.shape[1]) & (speed < limits.slow_body)] = "rest"
+    phase[(count == feet.shape[1]) & (speed < SLOW_BODY)] = "rest"
     phase[impact.any(axis=1)] = "impact"
     return ContactSchedule(may, settled, struck, slides, low, high, phase, rests, sticks)
 
@@ -147,20 +144,17 @@ def _after(flags: Flags, steps: float) -> Flags:
 
 def loaded(schedule: ContactSchedule, normal: Array, dt: float) -> ContactSchedule:
     """The same with only those feet settled that carry a load: `normal` (n, legs) in N, steady."""
-    settings = ContactSettings
-    width = max(3, round(settings.rate_window / dt))
-    firm = minimum_filter1d(normal, width, axis=0) > settings.firm_load
+    width = max(3, round(RATE_WINDOW / dt))
+    firm = minimum_filter1d(normal, width, axis=0) > FIRM_LOAD
     slides = schedule.slides * firm
     for leg in slides.T:  # short slips do not count: a foot that lifts off drags for a moment
         leg *= binary_opening(leg != 0.0, np.ones(width, bool))
-    return replace(
-        schedule, settled=schedule.settled & (normal > settings.least_load), slides=slides
-    )
+    return replace(schedule, settled=schedule.settled & (normal > LEAST_LOAD), slides=slides)
 
 
 def steady(values: Array, dt: float) -> Array:
     """Forces or rates (n, ...), smoothed: changes from sample to sample are noise."""
-    return np.asarray(gaussian_filter1d(values, ContactSettings.steady / dt, axis=0))
+    return np.asarray(gaussian_filter1d(values, STEADY / dt, axis=0))
 
 
 def steady_while(values: Array, acts: Flags, dt: float) -> Array:
@@ -172,8 +166,7 @@ def steady_while(values: Array, acts: Flags, dt: float) -> Array:
 
 def slope(values: Array, dt: float) -> Array:
     """Rate of a noisy signal (n, ...) over a few hundredths of a second."""
-    width = ContactSettings.rate_window
-    half = min(max(2, round(width / dt / 2)), (len(values) - 1) // 2)
+    half = min(max(2, round(RATE_WINDOW / dt / 2)), (len(values) - 1) // 2)
     return local_fit(values, half, dt, 2, 1)
 
 
@@ -182,12 +175,11 @@ def ground_level(z: Array, rate: Array) -> float:
 
     It need not be zero: sensors may be off by more than a centimetre.
     """
-    limits = ContactSettings
-    resting = z[(np.abs(z) < limits.level_search) & (np.abs(rate) < limits.level_rate)]
-    if len(resting) <= limits.level_rows:
+    resting = z[(np.abs(z) < LEVEL_SEARCH) & (np.abs(rate) < LEVEL_RATE)]
+    if len(resting) <= LEVEL_ROWS:
         return 0.0
     low = float(np.quantile(resting, 0.1))
-    return float(np.median(resting[resting < low + limits.stands]))
+    return float(np.median(resting[resting < low + STANDS]))
 
 
 def _wandering_level(z: Array, level: float, dt: float) -> Array:
@@ -196,24 +188,23 @@ def _wandering_level(z: Array, level: float, dt: float) -> Array:
     Sensors that drift lift a standing foot by a centimetre, and more than that from its usual
     `level` [m].
     """
-    limits = ContactSettings
-    width = max(3, round(limits.level_time / dt))
-    calm = uniform_filter1d(z, max(3, round(limits.rate_window / dt)), mode="nearest")
+    width = max(3, round(LEVEL_TIME / dt))
+    calm = uniform_filter1d(z, max(3, round(RATE_WINDOW / dt)), mode="nearest")
     low = maximum_filter1d(minimum_filter1d(calm, width), width)
-    return np.where(np.abs(low - level) < limits.level_search, low, level)
+    return np.where(np.abs(low - level) < LEVEL_SEARCH, low, level)
 
 
 def _stop_levels(x: Array, stroke: float) -> tuple[float, float]:
     """Readings [m] at the two stops: the extreme ones of x (n,) [m] of a slow piston, if they are
     near the ends of the stroke. What is read of a fast one may lie behind its stop: smoothed, or
     late and shifted, it overshoots."""
-    search, ordered = ContactSettings.stop_search, np.sort(x)
-    few = min(ContactSettings.stop_rows, len(x) - 1)
+    ordered = np.sort(x)
+    few = min(STOP_ROWS, len(x) - 1)
     if few < 0:
         return 0.0, stroke
     low, high = float(ordered[few]), float(ordered[-1 - few])
-    low = low if abs(low) < search else 0.0
-    return low, high if abs(high - stroke) < search else stroke
+    low = low if abs(low) < STOP_SEARCH else 0.0
+    return low, high if abs(high - stroke) < STOP_SEARCH else stroke
 
 
 def _dilate(flags: Flags, steps: int) -> Flags:

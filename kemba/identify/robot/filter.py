@@ -54,7 +54,6 @@ def gains(system: System) -> FilterGains:
     turn, P_all = np.empty_like(s.F), np.empty_like(s.F)
     carry, whitener = np.empty((n, runs, d, m)), np.empty((n, runs, m, m))
     P, diagonal = s.P0.copy(), np.arange(m)
-    spread = s.G @ s.W @ s.G.swapaxes(-1, -2)
     for k in range(n):
         P_all[k] = P
         PHt = P @ s.H[k].swapaxes(-1, -2)
@@ -65,7 +64,7 @@ def gains(system: System) -> FilterGains:
         t = turn[k] = s.F[k] - c @ s.H[k]
         # Joseph's form keeps P positive where a row is a thousand times sharper than the state
         P = t @ P @ t.swapaxes(-1, -2) + (c * R[k][:, None, :]) @ c.swapaxes(-1, -2)
-        P += spread[k]
+        P += s.G[k] @ s.W[k] @ s.G[k].swapaxes(-1, -2)
         P = 0.5 * (P + P.swapaxes(-1, -2))
     return FilterGains(whitener, P_all, turn, carry)
 

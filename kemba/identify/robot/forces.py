@@ -1,4 +1,5 @@
-"""Forces that a robot model may lack: their channels, simple terms, and d(t) with its 95 % band.
+"""What each residual row of robot logs is, and forces that a robot model may lack: their channels,
+simple terms, and d(t) with its 95 % band.
 
 Every channel's unknown force is a first-order lag of white noise, and a state of the filter. Its
 strength is learnt from the data; a channel that needs no force ends with almost none. In stance
@@ -7,18 +8,125 @@ the contact forces are unknown too, so only the force that they cannot explain i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from kemba.effects.mechanics.piston import V_COULOMB
+from kemba.effects.pneumatics.flow import ATMOSPHERE
+from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.problem.missing_force import dahl, end_terms, spans
-from kemba.identify.problem.types import Array, Flags, ForceChannel, MissingForce, Theta
+from kemba.identify.problem.types import (
+    Array,
+    Changes,
+    Flags,
+    ForceChannel,
+    MissingForce,
+    OperatingPoint,
+    Rows,
+    Texts,
+    Theta,
+)
+from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.filter import System, gains, smooth_with_band
-from kemba.identify.robot.reference import QUIET, densities
-from kemba.identify.robot.rows import SIDES, air_forces, changes
+from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.reference import QUIET, PlaceSettings, densities
 from kemba.identify.robot.state import LinearisedState
+from kemba.mechanism import Cylinder
+
+MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
+
+
+def _row_channels(physics: Physics) -> tuple[str, ...]:
+    """The measured channels, then the places of feet and stops that stand still."""
+    feet = (f"{leg}/foot/{axis}" for leg in physics.legs for axis in "xz")
+    return (*physics.channels, *feet, *(f"{leg}/stop" for leg in physics.legs))
+
+
+def describe(state: LinearisedState) -> Rows:
+    """Rows of the logs that are data, run by run, channel by channel."""
+    physics, batch, inputs = state.physics, state.batch, state.motion.states[1]
+    channels = _row_channels(physics)
+    m = len(channels)
+    found: dict[str, list[Texts]] = {}
+    for i, log in enumerate(batch.resampled):
+        own = state.mask[:, i].T
+        time = np.zeros(batch.n)
+        time[: len(log.time)] = log.time
+        phase = np.full(batch.n, "", dtype=object)
+        phase[: len(log.time)] = state.schedules[i].phase
+        sigma = np.append(log.sigma, [PlaceSettings.ground] * (m - len(log.sigma)))
+        whole = {
+            "run": np.full(own.shape, i),
+            "channel": np.broadcast_to(np.arange(m)[:, None], own.shape),
+            "time": np.broadcast_to(time, own.shape),
+            "phase": np.broadcast_to(phase, own.shape),
+            "mode": valve_modes(physics, inputs[:, i], channels).T,
+            "sigma": np.broadcast_to(sigma[:, None], own.shape),
+        }
+        for key, values in whole.items():
+            found.setdefault(key, []).append(values[own])
+    joined = {key: np.concatenate(parts) for key, parts in found.items()}
+    return Rows(channels=channels, **joined)  # type: ignore[arg-type]
+
+
+def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Texts:
+    """Mode (n, m) of the channel's own leg; of the body: the first leg's."""
+    texts = {}
+    for leg in physics.legs:
+        on = [
+            inputs[:, physics.inputs.index(f"{leg}/valve/{side}")] > 0.5
+            for side in ("extend", "retract")
+        ]
+        texts[leg] = MODES[2 * on[0].astype(int) + on[1]]
+    first = physics.legs[0]
+    return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=1)
+
+
+def _air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
+    """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
+    push = []
+    areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
+    for chamber, area in areas.items():
+        name = f"{prefix}chamber/{chamber}/"
+        known = states.get(f"{name}F")
+        push.append((states[f"{name}P"] - ATMOSPHERE) * area if known is None else known)
+    return np.asarray(push[0] - push[1])
+
+
+SIDES = ("extend", "retract")
+
+
+def robot_operating_point(state: LinearisedState) -> OperatingPoint:
+    """The pistons along the motion on which the model was linearised."""
+    legs, motion = state.physics.legs, state.motion
+    pistons = slice(motion.y.shape[-1] - len(legs), None)
+    place = (motion.y[..., pistons], motion.rate[..., pistons], air_forces(state))
+    per_leg = np.moveaxis(np.stack(place, axis=-1), 2, 0)  # (legs, n, L, 3)
+    owners = [channel.split("/")[0] for channel in _row_channels(state.physics)]
+    own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
+    x, v, force = state.pick(np.stack(own, axis=2)).T
+    return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
+
+
+def air_forces(state: LinearisedState) -> Array:
+    """Push of the model's air [N] on every leg's rod (n, L, legs)."""
+    names = [q.name for q in state.physics.model.states.values()]
+    states = dict(zip(names, np.moveaxis(state.motion.states[0], -1, 0), strict=True))
+    cylinder, legs = state.physics.mechanism.need_cylinder(), state.physics.legs
+    return np.stack([_air_force(states, cylinder, f"{leg}/") for leg in legs], axis=-1)
+
+
+def changes(log: ResampledLog, legs: Sequence[str]) -> Changes:
+    """Command -> times [s] and sizes of its changes in one run: valves, then hip torques [N.m]."""
+    valves = [f"{leg}/valve/{side}" for leg in legs for side in SIDES]
+    found = {name: switchings(sent) for name, sent in zip(valves, log.sent, strict=True)}
+    steps = np.diff(log.torque, axis=0)
+    for i, leg in enumerate(legs):
+        found[f"{leg}/hip/tau"] = (log.time[1:], steps[:, i])
+    return found
+
 
 BODY = {"body z": 1, "body x": 0}  # place among the channels
 
@@ -173,17 +281,17 @@ def _drag_terms(name: str, v: Array) -> Iterator[tuple[str, Array]]:
     yield f"v{name}**3", v**3
 
 
-class RobotMissingSettings:
-    """The missing force of robot logs. Its strength (1 sigma) is learnt per channel."""
-
-    memory = 0.025  # correlation time of the missing force [s]
-    rounds = 4  # rounds in which its strength is learnt
-    body = 5.0  # strength with which learning begins [N]
-    pitch = 0.5  # the same of the moment on the body [N.m]
-    hip = 0.5  # the same of the torque at a hip [N.m]
-    piston = 10.0  # the same of the force on a rod [N]
-    negligible = 0.1  # strength of a force that is as good as none [N]
-    negligible_moment = 0.01  # the same of a moment [N.m]
+# The missing force of robot logs. Its strength (1 sigma) is learnt per channel.
+MEMORY = 0.025  # correlation time of the missing force [s]
+ROUNDS = 4  # rounds in which its strength is learnt
+# of each channel: its unit, the strength with which learning begins, one that is as good as none
+STRENGTHS = {
+    "body/x": ("N", 5.0, 0.1),
+    "body/z": ("N", 5.0, 0.1),
+    "body/pitch": ("N.m", 0.5, 0.01),
+    "hip/q": ("N.m", 0.5, 0.01),
+    "piston/x": ("N", 10.0, 0.1),
+}
 
 
 def robot_missing(
@@ -194,23 +302,19 @@ def robot_missing(
     `strength` (k,): 1 sigma of each channel's force; learnt when not given.
     """
     names = state.physics.channels
-    kinds = [_kind(name) for name in names]
-    settings = RobotMissingSettings
-    begin = np.array([getattr(settings, kind) for kind in kinds])
-    sigma = begin if strength is None else strength
-    moment = np.isin(kinds, ("pitch", "hip"))
-    least = np.where(moment, settings.negligible_moment, settings.negligible)
+    usual = (STRENGTHS["/".join(name.split("/")[-2:])] for name in names)
+    units, begin, least = zip(*usual, strict=True)
+    sigma = np.array(begin) if strength is None else strength
     quiet = densities(state.physics, state.batch, state.schedules, QUIET)
     y, g = state.measurement(theta), state.acceleration(theta)
     valid, k = state.batch.valid, len(names)
-    for _ in range(settings.rounds if strength is None else 1):
+    for _ in range(ROUNDS if strength is None else 1):
         system = _with_forces(state, quiet, sigma)
         x, variance = smooth_with_band(system, gains(system), y, g)
         power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
         ratio = np.sqrt(power) / sigma
         # towards nothing such rounds creep, so that their steps are doubled
         used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
-    units = tuple("N.m" if kind in ("pitch", "hip") else "N" for kind in kinds)
     found = []
     for i, log in enumerate(state.batch.resampled):
         n = len(log.time)
@@ -218,11 +322,6 @@ def robot_missing(
         down = spans(log.time, state.schedules[i].phase != "flight")
         found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
     return found
-
-
-def _kind(channel: str) -> str:
-    last = channel.split("/")[1] if channel.count("/") > 1 else channel
-    return {"body/pitch": "pitch", "hip": "hip", "piston": "piston"}.get(last, "body")
 
 
 def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
@@ -238,7 +337,7 @@ def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System
     F[..., :d, :d] = base.F
     accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
     F[..., :d, d:] = accelerations
-    keep = np.exp(-h / RobotMissingSettings.memory)
+    keep = np.exp(-h / MEMORY)
     i = np.arange(k)
     F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
     j = base.G.shape[3]

@@ -2,7 +2,7 @@
 
 A foot that stands is at the height of the ground, whatever pushes it. Lengths that bring more rows
 of the logs to one height are believed where they do so much better than faults of sensors, and
-where the other sign of the body's pitch does not do better still. Nor where the ground is soft: a
+where no mistake in the columns does better still. Nor where the ground is soft: a
 foot sinks into it as it is loaded, and its load goes with the body's acceleration.
 """
 
@@ -20,6 +20,7 @@ from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
+from kemba.identify.robot.mix_ups import MixUp, slight
 from kemba.identify.robot.physics import Physics, SampleMap
 from kemba.identify.robot.reference import Reference
 from kemba.mechanism.knee import flexion_of
@@ -28,47 +29,46 @@ from kemba.mechanism.links import altered
 LEVER = "boom_lever"
 
 
-class StandingSettings:
-    """How lengths are found from feet that stand."""
-
-    every = 0.005  # time between the samples that are used [s]
-    # height at which the ground may seem to be [m]: as the search for the ground in contact.py
-    level = 0.02
-    window = 5e-3  # height of the band in which standing feet are [m]
-    # lengths that are tried first, one at a time, in sizes
-    tried = (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5)
-    bands = (0.02, 0.01, 5e-3, 4e-3)  # bands about the ground, from round to round [m]
-    noise = 7e-4  # noise of a standing foot's height [m]
-    together = 4.0  # samples that err together, so that they count as one
-    prior = 2.0  # prior width of a length, in sizes
-    reach = 2.5  # largest value of each, in prior widths
-    body = 3e-3  # prior sigma of the zero of the body's height [m]
-    zero = 0.02  # the same where it is in doubt [m]
-    angle = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
-    piston = 6e-4  # prior sigma of the zero of a piston [m]
-    sink = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
-    soft = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
-    lever = 0.04  # prior sigma of the boom's lever: two sizes
-    held = 1e-6  # width of what is not free, as a share: as good as none
-    deep = 0.02  # depth below the ground at which no foot can be [m]
-    often = 0.01  # share of samples so deep from which lengths are not believed
-    gain = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
-    # gain of the other sign of the pitch over any lengths, from which the sign is said to be
-    # reversed [nats]
-    turned = 12.0
-    # prior sigma of the zero of the pitch where its sign is judged: no zero is taken for a sign
-    # [rad]
-    pitch = 0.05
+# How lengths are found from feet that stand.
+EVERY = 0.005  # time between the samples that are used [s]
+# height at which the ground may seem to be [m]: as the search for the ground in contact.py
+LEVEL = 0.02
+WINDOW = 5e-3  # height of the band in which standing feet are [m]
+# lengths that are tried first, one at a time, in sizes
+TRIED = (-3.5, -2.5, -1.75, -1.25, -0.75, -0.35, 0.35, 0.75, 1.25, 1.75, 2.5, 3.5)
+BANDS = (0.02, 0.01, 5e-3, 4e-3)  # bands about the ground, from round to round [m]
+NOISE = 7e-4  # noise of a standing foot's height [m]
+TOGETHER = 4.0  # samples that err together, so that they count as one
+PRIOR = 2.0  # prior width of a length, in sizes
+REACH = 2.5  # largest value of each, in prior widths
+BODY = 3e-3  # prior sigma of the zero of the body's height [m]
+ZERO = 0.02  # the same where it is in doubt [m]
+ANGLE = 4e-3  # prior sigma of the zeros of pitch and hips [rad]
+PISTON = 6e-4  # prior sigma of the zero of a piston [m]
+STOP = 2e-3  # the same where it is in doubt [m]
+SINK = 3e-3  # prior sigma of how deep a foot sinks at rest [m]
+SOFT = 5e-4  # the same from which feet have no one height that could tell of lengths [m]
+LONGER = 0.04  # prior sigma of the boom's lever: two sizes
+HELD = 1e-6  # width of what is not free, as a share: as good as none
+DEEP = 0.02  # depth below the ground at which no foot can be [m]
+OFTEN = 0.01  # share of samples so deep from which lengths are not believed
+GAIN = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
+# gain of a mistake in the columns over any lengths from which it is named, and within which two
+# cannot be told [nats]
+MISTAKEN = 12.0
+# prior sigma of the zero of the pitch where mistakes are judged: no zero is taken for one [rad]
+PITCH = 0.05
 
 
 @dataclass(frozen=True)
 class StandingLengths:
     """Theta with the `lengths` [m] at which feet stand; `lever`: share by which a longer boom makes
-    them stand as well, 0 where none does; `turned`: they stand with the other sign of the pitch."""
+    them stand as well, 0 where none does; `mistakes` in the columns: they stand without any of them
+    better than with any lengths."""
 
     lengths: Mapping[str, float] = field(default_factory=dict)
     lever: float = 0.0
-    turned: bool = False
+    mistakes: tuple[str, ...] = ()
 
 
 class Standing:
@@ -82,9 +82,9 @@ class Standing:
     def __init__(
         self, physics: Physics, batch: Batch, reference: Reference, names: Sequence[str]
     ) -> None:
-        self.names, self.legs = tuple(names), len(physics.legs)
+        self.physics, self.names, self.legs = physics, tuple(names), len(physics.legs)
         dt = float(np.median(batch.h[batch.valid]))
-        step = max(1, round(StandingSettings.every / dt))
+        step = max(1, round(EVERY / dt))
         q = batch.flat(reference.q)[::step]
         y = physics.call("seen", q, 0 * q, p=physics.nominal)[0]
         lift = steady(reference.a[..., 1:2], dt) / physics.mechanism.need_robot().gravity
@@ -92,11 +92,16 @@ class Standing:
         self.samples = [q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None]]
         self._map = SampleMap(self._function(physics))
 
-    def turned(self) -> Standing:
-        """The same with the other sign of the body's pitch."""
-        found, q = copy(self), self.samples[0].copy()
-        q[:, 2] *= -1
-        found.samples = [q, *self.samples[1:]]
+    def without(self, mistake: MixUp) -> Standing:
+        """The same with a mistake in the columns put right."""
+        found, legs = copy(self), self.physics.legs
+        body, pistons, load = self.samples
+        names = ["body/x", "body/z", "body/pitch", *(f"{leg}/hip/q" for leg in legs)]
+        y = dict(zip(names, body.T, strict=True))
+        y |= {f"{leg}/piston/x": x for leg, x in zip(legs, pistons.T, strict=True)}
+        y |= mistake.change(y)
+        columns = np.stack(list(y.values()), axis=1)
+        found.samples = [columns[:, : len(names)], columns[:, len(names) :], load]
         return found
 
     def _function(self, physics: Physics) -> ca.Function:
@@ -141,33 +146,33 @@ def standing_lengths(
     if not sizes:
         return StandingLengths()
     standing = Standing(physics, batch, reference, tuple(sizes))
-    settings, legs = StandingSettings, standing.legs
-    zeros = [settings.angle, settings.body, *[settings.angle] * legs, *[settings.piston] * legs]
-    lengths, zeros = [settings.prior * size for size in sizes.values()], [*zeros, settings.sink]
-    free = np.array([*lengths, *zeros, settings.lever])
-    width = np.array([*lengths, *zeros, settings.lever * settings.held])
+    legs = standing.legs
+    zeros = [ANGLE, BODY, *[ANGLE] * legs, *[PISTON] * legs, SINK]
+    lengths = [PRIOR * size for size in sizes.values()]
+    free = np.array([*lengths, *zeros, LONGER])
+    width = np.array([*lengths, *zeros, LONGER * HELD])
     start = np.zeros(len(width))
     most = _most_rows(standing.heights(start)[0])
     for i, size in enumerate(sizes.values()):
-        for share in settings.tried:
+        for share in TRIED:
             trial = np.zeros(len(width))
             trial[i] = share * size
             count = _most_rows(standing.heights(trial)[0])
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
-    if _is_turned(standing, x, width, rows):
-        return StandingLengths(turned=True)
-    if x[-2] > settings.soft or min(_drawn(standing, x, width, rows)) - cost < settings.gain:
+    if mistakes := tuple(_mistakes(standing, x, width, rows)):
+        return StandingLengths(mistakes=mistakes)
+    if x[-2] > SOFT or min(_drawn(standing, x, width, rows)) - cost < GAIN:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
     one, alone, _ = min(singles, key=lambda fit: fit[1])
-    x = one if alone - cost < settings.gain else x
-    if np.mean(standing.heights(x)[0] < -settings.deep) > settings.often:
+    x = one if alone - cost < GAIN else x
+    if np.mean(standing.heights(x)[0] < -DEEP) > OFTEN:
         return StandingLengths()  # feet in the ground: columns are wrong, not lengths
     found = {n: float(d) for n, d in zip(sizes, x, strict=False) if abs(d) > 0.01 * sizes[n]}
     boom, by_boom, _ = _only(standing, (), x, free, rows)
-    as_good = LEVER in candidates and by_boom - min(alone, cost) < settings.gain
+    as_good = LEVER in candidates and by_boom - min(alone, cost) < GAIN
     return StandingLengths(found, float(boom[-1]) if as_good else 0.0)
 
 
@@ -186,32 +191,35 @@ def remarks(found: StandingLengths) -> list[str]:
     return [f"{said}, {other}; contacts were read with the former"]
 
 
-def _is_turned(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
-    """Whether feet stand better with the other sign of the pitch than with any lengths.
+def _mistakes(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[str]:
+    """Slight mistakes in the columns without which feet stand better than with any lengths.
 
-    Judged by the samples (n, legs) that stand with either: `rows` with this sign, fitted by `x`.
+    Each is judged by the samples (n, legs) that stand with or without it: `rows` with it, fitted by
+    `x`.
     """
-    loose, turned = width.copy(), standing.turned()
-    loose[len(standing.names)] = StandingSettings.pitch
+    loose, gains = width.copy(), {}
+    loose[len(standing.names)] = PITCH
     drawn = loose.copy()
-    drawn[: len(standing.names)] *= StandingSettings.held
-    either = rows | _refined(turned, np.zeros(len(x)), drawn)[2]
-    _, best, _ = _refined(standing, x, loose, either)
-    _, other, _ = _refined(turned, np.zeros(len(x)), drawn, either)
-    return best - other > StandingSettings.turned
+    drawn[: len(standing.names)] *= HELD
+    for mistake in slight(standing.physics.legs):
+        other = standing.without(mistake)
+        either = rows | _refined(other, np.zeros(len(x)), drawn)[2]
+        _, best, _ = _refined(standing, x, loose, either)
+        _, cost, _ = _refined(other, np.zeros(len(x)), drawn, either)
+        gains[mistake.text] = best - cost
+    most = max(gains.values())
+    yield from (text for text, gain in gains.items() if gain > max(MISTAKEN, most - MISTAKEN))
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
     """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
-    be, and with the zero of the height, of the pitch or of the hips in doubt."""
-    settings, first = StandingSettings, len(standing.names)
-    hips = range(first + 2, first + 2 + standing.legs)
-    doubts = ((), [first + 1], [first], list(hips))
-    for places, wide in zip(
-        doubts, (0.0, settings.zero, settings.pitch, settings.pitch), strict=True
-    ):
+    be, and with the zero of the height, of the pitch, of the hips or of the pistons in doubt."""
+    first, legs = len(standing.names), standing.legs
+    hips = list(range(first + 2, first + 2 + legs))
+    doubts: Sequence[list[int]] = ([], [first + 1], [first], hips, [i + legs for i in hips])
+    for places, wide in zip(doubts, (0.0, ZERO, PITCH, PITCH, STOP), strict=True):
         loose = width.copy()
-        loose[list(places)] = wide
+        loose[places] = wide
         yield _only(standing, (), np.where(loose == width, x, 0.0), loose, rows)[1]
 
 
@@ -221,7 +229,7 @@ def _only(
     """The refined fit with all lengths but the `free` ones as the model has them."""
     held = np.array([i not in free for i in range(len(standing.names))])
     narrow, begin = width.copy(), x.copy()
-    narrow[: len(held)][held] *= StandingSettings.held
+    narrow[: len(held)][held] *= HELD
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
 
@@ -233,9 +241,8 @@ def _most_rows(heights: Array) -> int:
 
 def _crowd(heights: Array) -> Array:
     """The heights of the samples that stand at one height near that of the ground."""
-    settings = StandingSettings
-    near = np.sort(heights[np.abs(heights) < settings.level])
-    ends = np.searchsorted(near, near + settings.window)
+    near = np.sort(heights[np.abs(heights) < LEVEL])
+    ends = np.searchsorted(near, near + WINDOW)
     first = int(np.argmax(ends - np.arange(len(near)))) if len(near) else 0
     return near[first : ends[first]] if len(near) else near
 
@@ -245,10 +252,9 @@ def _refined(
 ) -> tuple[Array, float, Flags]:
     """The best x (k,) with prior widths (k,), half the sum of squares, and the samples (n, legs)
     that stand; `rows`: which samples are known to."""
-    settings = StandingSettings
-    weight = 1.0 / (settings.noise * np.sqrt(settings.together))
+    weight = 1.0 / (NOISE * np.sqrt(TOGETHER))
     cost = 0.0
-    for band in settings.bands:
+    for band in BANDS:
         heights, _ = standing.heights(x)
         crowd = _crowd(heights)
         level = float(np.median(crowd)) if len(crowd) else 0.0
@@ -268,9 +274,8 @@ def _fit(
     def slopes(z: Array) -> Array:
         return np.vstack([weight * standing.heights(z * width)[1][rows] * width, np.eye(len(z))])
 
-    reach = StandingSettings.reach
-    start = np.clip(x / width, -0.99 * reach, 0.99 * reach)
+    start = np.clip(x / width, -0.99 * REACH, 0.99 * REACH)
     found = least_squares(
-        residual, start, slopes, (-reach, reach), loss="soft_l1", f_scale=2.0, max_nfev=10
+        residual, start, slopes, (-REACH, REACH), loss="soft_l1", f_scale=2.0, max_nfev=10
     )
     return found.x * width, float(found.cost)

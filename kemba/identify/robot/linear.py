@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from kemba.identify.problem.types import Array, Flags
-from kemba.identify.robot.batch import Batch
+from kemba.identify.robot.batch import Batch, travelled
 from kemba.identify.robot.contact import ContactSchedule, steady, steady_while
 from kemba.identify.robot.filter import FilterGains, System, smooth
 from kemba.identify.robot.noise import Noise, coloured
@@ -20,7 +20,6 @@ from kemba.identify.robot.reference import (
     Reference,
     integrator,
 )
-from kemba.identify.robot.sensing import travelled
 
 
 @dataclass(frozen=True)

@@ -2,233 +2,360 @@
 
 While the ground carries the robot, its lowest foot is on the ground and stands still, and each
 foot does so for a part of the time. Where the measured motion says otherwise, each usual mistake,
-and each pair of them, is put right in turn; the simplest after which the feet stand within
-millimetres is named, with what is the same to the feet of a robot that is its own mirror image.
-Only the geometry of the robot as it is drawn is used, no forces and no fitted lengths.
+and each pair of them, is put right in turn: a sign, a unit, a swap, a zero that is then fitted. The
+simplest after which the feet stand within millimetres is named, with all that leave as little. What
+moves the feet by millimetres only is an effect, and no mistake; other lengths of the legs are one
+more hypothesis, which never counts where a mistake explains as much.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
+from scipy.optimize import minimize_scalar
 
+from kemba.effects.pneumatics.switching import Pulse
+from kemba.effects.sensors import SensorBias, SensorScale
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.types import Array, Theta
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.physics import Physics
 
-Columns = Mapping[str, Array]
-Change = Callable[[Columns], dict[str, Array]]
-OTHER_ZERO = "body/z counts from another zero"
+Columns = Mapping[str, Any]  # readings (n,), or the pulses of a valve
+Change = Callable[[Columns], dict[str, Any]]
 HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
 CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
-WINDOW = 0.05  # time in which a standing foot does not move [s]
+WINDOW = 0.1  # time in which a standing foot does not move [s]
+SMOOTH = 0.02  # time over which readings are smoothed [s]
 ROW = 0.005  # distance of the rows that are looked at [s]
 FEWEST = 10  # rows on the ground from which feet can be judged
-# typical error of a standing foot that no mix-up would leave [m]: a late encoder moves a foot
-# by 9 mm
+STILL = 2.5e-3  # error of a standing foot that sensors make which are right [m]
+# error of a standing foot that sensors make, and distance by which a mistake must move a foot, or
+# it is an effect [m]: a late encoder moves one by 9 mm
 SMALL = 0.012
-BETTER = 4.0  # factor by which a mix-up must make the feet stand better
-# height by which the zero of body/z must be off where other lengths make feet stand, too [m]
-ZERO = 0.05
-ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told
+BETTER = 2.5  # factor by which a mix-up must make the feet stand better
+ZERO = 0.05  # the latter where other lengths of the legs make feet stand, too [m]
+ALIKE = 1.5  # factor within which hypotheses of as many mistakes cannot be told by feet
+# sizes of a sensor's bias or gain from which these are mistakes, and no effects: the zero of an
+# angle is set by eye, a piston has its stops
+LARGE, BY_EYE = 3.0, 10.0
+GRID, FINE = 9, 2e-3  # zeros that are tried first; share of its reach to which one is found
+SAME = 1.02  # the same by what the model leaves: thousands of rows tell so much
+QUARTER = np.pi / 2  # turns by which hips are mounted wrongly [rad]
+REACH = {"hip/q": QUARTER / 2, "piston/x": 0.02, "body/pitch": 0.4}  # of a zero, from its start
 
 
 @dataclass(frozen=True)
 class MixUp:
-    """One mistake in words, what it is a mistake `about`, and the columns put right."""
+    """One mistake in words, what it is a mistake `about`, and the columns put right.
+
+    `at`: where it is that of a zero, the same for a zero that is so much more, up to `reach`; it is
+    where the lowest foot is on the ground if that is infinite. `small`: it is an effect, which a
+    sensor may have.
+    """
 
     text: str
     about: frozenset[str]
     change: Change
+    at: Callable[[float], MixUp] | None = None
+    reach: float = 0.0
+    small: bool = False
 
 
-def mixed_up(physics: Physics, log: ResampledLog, lengths: bool = False) -> Iterator[KembaError]:
+Some = Sequence[MixUp]
+
+
+def mixed_up(
+    physics: Physics,
+    log: ResampledLog,
+    lengths: Theta | None = None,
+    left: Callable[[ResampledLog], float] = lambda _: 1.0,
+) -> Iterator[KembaError]:
     """The mistake in the columns of a log, or two of them, if its feet stand much better without.
 
-    `lengths`: other lengths of the legs make feet stand as well; then one mistake must do, for two
-    say no more than a length does.
+    `lengths` of the legs at which feet stand as well; then one mistake must do, for two say no more
+    than a length does, and it must leave as little. `left`: what the model leaves of a log; it
+    tells what feet cannot.
     """
     feet = _Feet(physics, log)
-    feet.least = ZERO if lengths else 0.0
-    most = 1 if lengths else 2
     error = feet.restless([])
-    if error is None or error < SMALL:
+    if error is None or error < STILL:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
     goal = min(SMALL, error / BETTER)
-    for count in range(1, most + 1):
-        trials = []
-        for some in combinations(known, count):
-            if count == 2 and some[0].about & some[1].about:
-                continue
-            left = feet.restless(some)
-            if left is not None:
-                trials.append((left, some))
-        fitting = [(e, some) for e, some in trials if e < goal]
-        if fitting:
-            yield _said(log.name, error, feet, fitting)
+    if lengths:
+        goal = min(goal, ALIKE * (feet.restless([], lengths) or goal))
+    for count in range(1, 2 if lengths or error < SMALL else 3):
+        pool = combinations([m for m in known if count == 1 or not m.small], count)
+        apart = (some for some in pool if count == 1 or not some[0].about & some[1].about)
+        trials = [(feet.restless(some) or np.inf, some) for some in map(feet.fitted, apart)]
+        best = min(after for after, _ in trials)
+        if best < goal:
+            close = [some for after, some in trials if after < min(goal, ALIKE * best)]
+            least = ZERO if lengths else SMALL
+            if not all(feet.is_effect(some, least) for some in close):
+                rest = [left(corrected(log, physics, some)) for some in close]
+                close = [s for s, e in zip(close, rest, strict=True) if e <= SAME * min(rest)]
+            if not any(feet.is_effect(some, least) for some in close):
+                yield _said(log.name, error, best, close)
             return
 
 
-def _said(
-    name: str, error: float, feet: _Feet, fitting: Sequence[tuple[float, Sequence[MixUp]]]
-) -> KembaError:
-    """The best hypothesis, and others that the feet cannot tell from it."""
-    best = min(e for e, _ in fitting)
-    close = [some for e, some in fitting if e <= ALIKE * best]
+def _said(name: str, error: float, best: float, close: Sequence[Some]) -> KembaError:
     texts = [" and ".join(m.text for m in some) for some in close]
-    offset = next(
-        (f for some in close[:1] for m in some if (f := feet.offset(some, m)) is not None), None
+    several = " (feet cannot tell these apart)" if len(texts) > 1 else ""
+    what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {'; or '.join(texts)}"
+    return KembaError(name, what + several, f"corrected, it is {1e3 * best:.0f} mm", HINT)
+
+
+def corrected(log: ResampledLog, physics: Physics, some: Some) -> ResampledLog:
+    """A log with mistakes put right, and the noise of what its columns then are."""
+    legs, channels = physics.legs, physics.channels
+    hips = [f"{leg}/hip/tau" for leg in legs]
+    valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
+    commands = [*zip(hips, log.torque.T, strict=True), *zip(valves, log.sent, strict=True)]
+    y, noisy = (
+        _changed({**dict(zip(channels, z.T, strict=True)), **dict(commands)}, some)
+        for z in (log.y, log.y + log.sigma)
     )
-    if offset is not None:
-        texts[0] += f" ({1e3 * offset:+.0f} mm too much)"
-    several = f"{'; or '.join(texts)}" + (
-        " (feet cannot tell these apart)" if len(texts) > 1 else ""
+    read, above, torque = (
+        np.stack([x[name] for name in names], axis=1)
+        for x, names in ((y, channels), (noisy, channels), (y, hips))
     )
-    what = f"a foot is {1e3 * error:.0f} mm from where it should stand: {several}"
-    return KembaError(name, what, f"corrected, it is {1e3 * best:.0f} mm", HINT)
+    sigma, sent = np.nanmedian(np.abs(above - read), axis=0), tuple(y[name] for name in valves)
+    return replace(log, y=read, torque=torque, sent=sent, sigma=sigma)
+
+
+def _changed(y: Columns, some: Some) -> dict[str, Any]:
+    y = dict(y)
+    for mistake in some:
+        y |= mistake.change(y)
+    return y
+
+
+def _number(value: float, unit: str) -> str:
+    """A zero [rad or m] in words."""
+    shown, word = (1e3 * value, "mm") if unit == "m" else (np.degrees(value), "degrees")
+    return f"{shown:+.{0 if abs(shown) >= 10 else 1}f} {word}"
 
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
-    """Mistakes of one kind each, and how to put each right."""
+    """Mistakes of one kind each, effects that may look alike, and how to put each right."""
+    yield from slight(legs)
+    yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
+    yield _zero("body/pitch counts from another zero", ["body/pitch"])
+    yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
+    yield _zero("body/z counts from another zero", ["body/z"])
+    yield _zero("body/z counts downwards from a zero", ["body/z"], -1.0)
+    for name in (
+        "body/z",
+        "body/pitch",
+        *(f"{g}/{x}" for g in legs for x in ("hip/q", "piston/x")),
+    ):
+        yield _scale(name)
+    yield _swap("body/x and body/z are swapped", ("body/x", "body/z"))
+    for whose, some in _groups(legs):
+        hips, torques, pistons = (
+            [f"{leg}/{x}" for leg in some] for x in ("hip/q", "hip/tau", "piston/x")
+        )
+        yield _each(f"hip/q of {whose} has the reversed sign", hips, np.negative)
+        text = f"hip/q and hip/tau of {whose} have the reversed sign"
+        yield _each(text, [*hips, *torques], np.negative)
+        yield _zero(f"hip/q of {whose} counts from another zero", hips)
+        for start in (QUARTER, -QUARTER, 2 * QUARTER):
+            yield _zero(f"hip/q of {whose} counts from another zero", hips, 1.0, start)
+            text = f"hip/q of {whose} has the reversed sign and another zero"
+            yield _zero(text, hips, -1.0, -start)
+        text = f"piston/x of {whose} counts from the extended end"
+        yield _each(text, pistons, lambda x: stroke - x)
+        yield _zero(f"piston/x of {whose} counts from another zero", pistons)
+    if len(legs) == 2:
+        columns = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
+        pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in columns]
+        yield _swap("hip/q of the legs is swapped", pairs[0])
+        yield _swap("the legs are swapped", *pairs)
+        text = (
+            "body/x and body/pitch have the reversed sign and the legs are swapped (the robot is "
+            "seen from its other side)"
+        )
+        turned = _each(text, ["body/x", "body/pitch"], np.negative)
+        swap = _swap(text, *pairs)
+        both = turned.about | swap.about
+        yield MixUp(text, both, lambda y: {**swap.change(y), **turned.change(y)})
+
+
+def slight(legs: Sequence[str]) -> Iterator[MixUp]:
+    """Those of them that move feet by millimetres only in a motion that is even and upright."""
     yield _each(
         "body/pitch has the reversed sign (nose up is positive)", ["body/pitch"], np.negative
     )
-    yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
-    yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
-    yield MixUp(OTHER_ZERO, frozenset({"body/z"}), _nothing)
-    yield _each("body/z counts downwards", ["body/z"], np.negative)
-    yield MixUp(
-        "body/x and body/z are swapped",
-        frozenset({"body/x", "body/z"}),
-        _exchange(("body/x", "body/z")),
-    )
-    groups = [("every leg", list(legs)), *((f"the {leg} leg", [leg]) for leg in legs)]
-    for whose, some in groups if len(legs) > 1 else groups[1:]:
-        hips, pistons = ([f"{leg}/{x}" for leg in some] for x in ("hip/q", "piston/x"))
-        yield _each(f"hip/q of {whose} has the reversed sign", hips, np.negative)
-        for degrees in (90, -90, 180):
-            yield _each(
-                f"hip/q of {whose} counts from another zero ({degrees:+d} degrees too much)",
-                hips,
-                partial(np.add, -np.radians(degrees)),
-            )
-            yield _each(
-                f"hip/q of {whose} has the reversed sign and another zero ({degrees:+d} degrees)",
-                hips,
-                partial(np.subtract, np.radians(degrees)),
-            )
-        yield _each(
-            f"piston/x of {whose} counts from the extended end",
-            pistons,
-            partial(np.subtract, stroke),
-        )
     if len(legs) == 2:
-        pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in ("hip/q", "piston/x")]
-        both = frozenset(name for pair in pairs for name in pair)
-        yield MixUp("the legs are swapped", both, _exchange(*pairs))
-        yield MixUp(
-            "body/x and body/pitch have the reversed sign and the legs are swapped (the robot is "
-            "seen from its other side)",
-            both | {"body/x", "body/pitch"},
-            _mirrored(pairs),
+        yield _swap(
+            "piston/x of the legs is swapped", (f"{legs[0]}/piston/x", f"{legs[1]}/piston/x")
         )
 
 
-def _each(text: str, names: Sequence[str], change: Callable[[Array], Array]) -> MixUp:
-    return MixUp(text, frozenset(names), lambda y: {name: change(y[name]) for name in names})
+def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
+    """The same about commands; those of valves are pulses."""
+    sides = ("extend", "retract")
+    for whose, some in _groups(legs):
+        hips = [f"{leg}/hip/tau" for leg in some]
+        pairs = [(f"{leg}/valve/extend", f"{leg}/valve/retract") for leg in some]
+        valves = [name for pair in pairs for name in pair]
+        yield _each(f"hip/tau of {whose} has the reversed sign", hips, np.negative)
+        both = "valve/extend and valve/retract are"
+        yield _swap(f"{both} swapped at {whose}", *pairs)
+        yield _each(f"{both} inverted (1 is on) at {whose}", valves, _inverted)
+        for side in sides:
+            one = [f"{leg}/valve/{side}" for leg in some]
+            yield _each(f"valve/{side} is inverted (1 is on) at {whose}", one, _inverted)
+    if len(legs) == 2:
+        crossed = {x: (f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in
+                   ("hip/tau", *(f"valve/{side}" for side in sides))}  # fmt: skip
+        for x, pair in crossed.items():
+            yield _swap(f"{x} of the legs is swapped", pair)
+        yield _swap("the valves of the legs are swapped", *list(crossed.values())[1:])
+        yield _swap("the commands of the legs are swapped", *crossed.values())
 
 
-def _nothing(y: Columns) -> dict[str, Array]:
-    """The zero of the height is found by where the lowest foot is."""
-    return {}
+def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:
+    """Every leg, and each."""
+    every = [("every leg", list(legs))] if len(legs) > 1 else []
+    return [*every, *((f"the {leg} leg", [leg]) for leg in legs)]
 
 
-def _exchange(*pairs: tuple[str, str]) -> Change:
-    return lambda y: {a: y[b] for pair in pairs for a, b in (pair, pair[::-1])}
+def _inverted(sent: Sequence[Pulse]) -> list[Pulse]:
+    """Pulses of a valve that is on where it was off."""
+    edges = [-np.inf, *(t for pulse in sent for t in pulse), np.inf]
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if a < b]
 
 
-def _mirrored(pairs: Sequence[tuple[str, str]]) -> Change:
-    turned = ("body/x", "body/pitch")
-    return lambda y: {**_exchange(*pairs)(y), **{name: np.negative(y[name]) for name in turned}}
+def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixUp:
+    return MixUp(text, frozenset(names), lambda y: {n: change(y[n]) for n in names if n in y})
 
 
-def _rezeroed(some: Sequence[MixUp]) -> bool:
-    """Whether the zero of the height is to be found: where the lowest foot is."""
-    return any(m.text.startswith("body/z counts") for m in some)
+def _zero(text: str, names: Sequence[str], sign: float = 1.0, start: float = 0.0) -> MixUp:
+    """A zero (and a sign): what is true is sign * reading - zero."""
+    reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
+    bias = SensorBias(channel=names[0])
+    least = (BY_EYE if bias.unit == "rad" else LARGE) * bias.parameters()["b"].size
+
+    def at(more: float) -> MixUp:
+        zero = start + more
+        said = f"{text} ({_number(sign * zero, bias.unit)} too much)"
+        found = _each(said, names, lambda x: sign * x - zero)
+        return replace(found, small=sign > 0.0 and abs(zero) < least)
+
+    return replace(at(0.0), at=at, reach=reach)
+
+
+def _scale(name: str) -> MixUp:
+    """A gain of a sensor that is off by a share."""
+
+    def at(share: float) -> MixUp:
+        return replace(_each(name, [name], lambda x: x / (1.0 + share)), small=True)
+
+    reach = LARGE * SensorScale(channel=name).parameters()["k"].size
+    return replace(at(0.0), at=at, reach=reach)
+
+
+def _swap(text: str, *pairs: tuple[str, str]) -> MixUp:
+    both = [ends for pair in pairs for ends in (pair, pair[::-1])]
+    about = frozenset(name for pair in pairs for name in pair)
+    return MixUp(text, about, lambda y: {a: y[b] for a, b in both if b in y})
 
 
 class _Feet:
     """Feet of a log as its columns say, with mistakes put right."""
 
     def __init__(self, physics: Physics, log: ResampledLog) -> None:
-        self.physics, self.log = physics, log
-        self.least = 0.0  # zero of body/z that is a mistake, at least [m]
+        self.physics = physics
         self.step = float(np.median(np.diff(log.time)))
         self.half = max(1, round(0.5 * WINDOW / self.step))
         good = np.isfinite(log.y)
         self.enough = bool(np.all(good.sum(axis=0) > FEWEST))
         self.enough &= len(log.time) > 4 * self.half
+        smooth = max(1, round(0.5 * SMOOTH / self.step))
         self.y = {
-            name: np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i])
+            name: local_fit(
+                np.interp(log.time, log.time[good[:, i]], log.y[good[:, i], i]),
+                smooth,
+                self.step,
+                2,
+            )
             for i, name in enumerate(physics.channels)
-            if good[:, i].any()
+            if self.enough
         }
 
-    def restless(self, some: Sequence[MixUp]) -> float | None:
-        """How far [m] feet are from the ground and from their place one window before.
+    def restless(self, some: Some, lengths: Theta | None = None) -> float | None:
+        """How far [m] feet are from the ground, and come within a window.
 
-        The lowest foot stands in most of the rows on the ground, and each foot in a quarter of them
-        at least: the largest of these quantiles. None where too few rows tell it, or where a zero
-        of the height is no mistake.
+        The lowest foot stands in most of the rows in which the ground carries the robot, and each
+        foot in a quarter of them at least: the largest of these quantiles. None where too few rows
+        tell it.
         """
         if not self.enough:
             return None
-        places, rows = self._places(some)
+        places, rows = self._places(some, lengths)
         if len(rows) < FEWEST:
             return None
-        before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
-        lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
-        height = now[:, :, 1]
-        if some and np.median(self._changed(some)["body/z"]) < 0.0 and not _rezeroed(some):
+        if some and np.median(_changed(self.y, some)["body/z"]) < 0.0:
             return None  # the body is under the ground
-        if _rezeroed(some):
-            zero = float(np.median(np.take_along_axis(height, lowest, axis=1)))
-            if abs(zero) < self.least and any(m.text == OTHER_ZERO for m in some):
-                return None
-            height = height - zero
-        far = np.hypot(height, np.linalg.norm(after - before, axis=2))
+        before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
+        far = np.hypot(now[:, :, 1], np.linalg.norm(after - before, axis=2))
+        lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
         nearest = np.take_along_axis(far, lowest, axis=1)
-        return float(max(np.median(nearest), np.quantile(far, 0.25, axis=0).max()))
+        return float(max(np.quantile(nearest, 0.75), np.quantile(far, 0.25, axis=0).max()))
 
-    def offset(self, some: Sequence[MixUp], mistake: MixUp) -> float | None:
-        """By how much [m] the height reads too much, where its zero is the mistake."""
-        if mistake.text != OTHER_ZERO:
-            return None
-        places, rows = self._places(some)
-        return float(np.median(places[rows, :, 1].min(axis=1)))
+    def fitted(self, some: Some) -> list[MixUp]:
+        """Mistakes about zeros, each with that after which feet stand best; of two mistakes only
+        that of the height is fitted."""
+        found = list(some)
+        for i, mistake in enumerate(some):
+            at = mistake.at
+            if at is None or (len(some) > 1 and np.isfinite(mistake.reach)):
+                continue
+            if np.isfinite(mistake.reach):
+                grid = np.linspace(-mistake.reach, mistake.reach, GRID)
+                left = [self.restless([at(more)]) or np.inf for more in grid]
+                near, step = grid[int(np.argmin(left))], grid[1] - grid[0]
+                best = minimize_scalar(
+                    lambda more, at=at: self.restless([at(more)]) or np.inf,
+                    bounds=(near - step, near + step),
+                    method="bounded",
+                    options={"xatol": FINE * mistake.reach},
+                )
+                found[i] = at(float(best.x))
+            else:
+                places, rows = self._places(some)
+                lowest = places[rows, :, 1].min(axis=1)
+                found[i] = at(float(np.median(lowest)) if len(rows) else 0.0)
+        return found
 
-    def _changed(self, some: Sequence[MixUp]) -> dict[str, Array]:
-        y = dict(self.y)
-        for mistake in some:
-            y |= mistake.change(y)
-        return y
+    def is_effect(self, some: Some, least: float) -> bool:
+        """Whether these mistakes are no more than effects: a fault that a sensor may have, or less
+        than SMALL at the feet; `least` [m]: the latter of the zero of the height."""
+        (places, rows), (as_read, _) = self._places(some), self._places([])
+        away = np.linalg.norm(places[rows] - as_read[rows], axis=2)
+        far = least if any(m.about == {"body/z"} for m in some) else SMALL
+        return any(m.small for m in some) or float(np.mean(away, axis=0).max()) < far
 
-    def _places(self, some: Sequence[MixUp]) -> tuple[Array, np.ndarray]:
-        """Places (n, legs, 2) of the feet [m], and the rows at which the ground carries the robot,
-        half a window from the ends at least."""
-        half, y = self.half, self._changed(some)
+    def _places(self, some: Some, lengths: Theta | None = None) -> tuple[Array, np.ndarray]:
+        """Places (n, legs, 2) of the feet [m], and the rows around which the ground carries the
+        robot for a window."""
+        half, y = self.half, _changed(self.y, some)
         columns = np.stack([y[name] for name in self.physics.channels], axis=1)
-        fall = local_fit(columns[:, 1], half, self.step, 2, 2)
+        fall = local_fit(columns[:, 1], max(1, half // 2), self.step, 2, 2)
+        carried = minimum_filter1d((fall > -CARRIED).astype(int), 2 * half + 1)
         rows = np.arange(half, len(columns) - half, max(1, round(ROW / self.step)))
-        rows = rows[fall[rows] > -CARRIED]
-        count, p = len(self.physics.legs), self.physics.nominal
+        rows = rows[carried[rows] > 0]
+        count, p = len(self.physics.legs), self.physics.at(lengths or {})
         wanted = np.unique(np.concatenate([rows - half, rows, rows + half]))
         known = columns[wanted]
         q = np.hstack([known[:, : 3 + count], self.physics.knees(known[:, 3 + count :], p)])

@@ -14,9 +14,8 @@ from kemba.identify.problem.types import Array, Flags, Theta
 from kemba.identify.robot.candidates import without_delay
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
-from kemba.model.exponential import midpoint_step
 from kemba.model.model import Model
-from kemba.model.rest import Rest, rate_of
+from kemba.model.rest import Rest, midpoint_step, rate_of
 from kemba.quantity import Quantity
 
 

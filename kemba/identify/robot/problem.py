@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -31,10 +31,17 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
-from kemba.identify.robot.batch import Batch, resample
+from kemba.identify.robot.batch import Batch, ResampledLog, resample
 from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.forces import formula_columns, robot_force_channels, robot_missing
-from kemba.identify.robot.geometry import remarks, standing_lengths
+from kemba.identify.robot.forces import (
+    changes,
+    describe,
+    formula_columns,
+    robot_force_channels,
+    robot_missing,
+    robot_operating_point,
+)
+from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
 from kemba.identify.robot.mix_ups import mixed_up
 from kemba.identify.robot.noise import (
     Noise,
@@ -45,17 +52,8 @@ from kemba.identify.robot.noise import (
 )
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
-from kemba.identify.robot.rows import changes, describe, robot_operating_point
 from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
-from kemba.identify.robot.validate import (
-    BETTER,
-    HINT,
-    contradictions,
-    is_absurd,
-    turned_pitch,
-    turned_torques,
-    valve_mix_ups,
-)
+from kemba.identify.robot.validate import contradictions, mixed_commands, rms, slightly_mixed_up
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -106,6 +104,14 @@ class RobotProblem(Problem):
         sensors = SensorFaults(model.effects)
         reference = first_reference(physics, batch, physics.nominal)
         self.standing = standing_lengths(physics, batch, reference, self.candidates)
+        legs = self.standing.lengths
+        self.mixed = [
+            f for log in batch.resampled for f in mixed_up(physics, log, legs, self._left(physics))
+        ]
+        if not self.mixed and self.standing.mistakes:
+            self.mixed = [slightly_mixed_up(self.runs, self.standing.mistakes)]
+        if self.mixed:  # lengths are not fitted to a log whose zeros are in doubt
+            self.standing = StandingLengths()
         self.lengths = lengths = dict(self.standing.lengths)
         given = lengths, ground, self.unknown, stated_noise(batch), None if lengths else reference
         self.state = linearise_at(physics, batch, sensors, *given)
@@ -270,35 +276,25 @@ class RobotProblem(Problem):
         return remarks(self.standing)
 
     def _faults(self) -> list[KembaError]:
-        """What is wrong with the logs, the simplest first: columns by the feet alone, the sign of
-        torques, then what no model explains, and the valves if they are the reason."""
-        logs, lengths = self.batch.resampled, bool(self.lengths)
-        if faults := [f for log in logs for f in mixed_up(self.physics, log, lengths)]:
-            return faults
-        if self.standing.turned:
-            return [turned_pitch(self.runs)]
+        """What is wrong with the logs, the simplest first: columns by the feet alone, commands by
+        what the model leaves, then what no model explains."""
+        if self.mixed:
+            return self.mixed
         r, rows = self.residual(self.lengths), self.rows()
-        if faults := list(turned_torques(self.state, rows, r)):
-            return faults
-        if is_absurd(self.physics.channels, rows, r) and (faults := self._valve_faults(r)):
+        if faults := list(mixed_commands(self.state, rows, r)):
             return faults
         return list(contradictions(self.state, rows, r, self._sensor_columns))
 
-    def _valve_faults(self, r: Array) -> list[KembaError]:
-        """The mistake about the valves after which the logs contradict the model no more, and leave
-        a residual much smaller than r (n,); the best of them."""
-        found = []
-        for text, logs in valve_mix_ups(self.logs, self.physics.legs):
-            other = type(self)(logs, self.model, self.unknown)
-            left = other.residual(other.lengths)
-            if not list(contradictions(other.state, other.rows(), left, other._sensor_columns)):
-                found.append((float(np.sqrt(np.mean(left**2))), text))
-        before = float(np.sqrt(np.mean(r**2)))
-        after, text = min(found, default=(before, ""))
-        if after > before / BETTER:
-            return []
-        what = f"the logs err by {before:.1f} times their noise, and by {after:.1f} times then"
-        return [KembaError(", ".join(self.runs), text, what, HINT)]
+    def _left(self, physics: Physics) -> Callable[[ResampledLog], float]:
+        """What the model leaves of another log."""
+
+        def left(log: ResampledLog) -> float:
+            batch, sensors = Batch((log,)), SensorFaults(self.model.effects)
+            ground, noise = ground_of(self.model)[1], stated_noise(batch)
+            state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
+            return rms(state.pick(state.residuals([{}])))
+
+        return left
 
     def _sensor_columns(self) -> Array:
         """Columns (n, k) of every sensor fault and every length, per size."""

@@ -59,22 +59,11 @@ class PlaceSettings:
     thinnest = 0.5  # smallest factor by which a yielding ground stiffens: stays positive
 
 
-class KinematicSettings:
-    """Smoothing of every coordinate for itself: density of its acceleration."""
-
-    body_x = 30.0  # of the body along the rail [m2.s-3]
-    body_z = 60.0  # of the body's height [m2.s-3]
-    body_pitch = 300.0  # of the body's pitch [rad2.s-3]
-    hip = 2e3  # of a hip [rad2.s-3]
-    knee = 2e5  # of a knee [rad2.s-3]
-    position = 10.0  # prior sigma of a start [m, rad]: no knowledge
-    velocity = 100.0  # prior sigma of its rate [m.s-1, rad.s-1]: no knowledge
-
-    @classmethod
-    def density(cls, coordinate: str) -> float:
-        """Of the coordinate of this name."""
-        known = {"body/x": cls.body_x, "body/z": cls.body_z, "body/pitch": cls.body_pitch}
-        return known.get(coordinate) or (cls.hip if "hip" in coordinate else cls.knee)
+# Smoothing of every coordinate for itself: density of its acceleration, of the body along the rail
+# [m2.s-3], its height and its pitch [rad2.s-3], of a hip and a knee [rad2.s-3].
+SMOOTHED = {"body/x": 30.0, "body/z": 60.0, "body/pitch": 300.0, "hip/q": 2e3, "knee/q": 2e5}
+# prior sigma of a start [m, rad] and of its rate [m.s-1, rad.s-1]: no knowledge
+ANYWHERE, ANYHOW = 10.0, 100.0
 
 
 @dataclass(frozen=True)
@@ -117,15 +106,12 @@ def first_reference(physics: Physics, batch: Batch, p: Array) -> Reference:
     slope = np.diagonal(physics.call("measured", known, 0 * known, p=p)[2], axis1=1, axis2=2)
     q, slope = batch.deep(q, np.nan), batch.deep(np.abs(slope), 1.0)
     F, G = integrator(batch.h, k, 0)
-    settings = KinematicSettings
-    names = [c.name for c in physics.mechanism.coordinates]
-    density = np.array([settings.density(name) for name in names])
+    names = ["/".join(c.name.split("/")[-2:]) for c in physics.mechanism.coordinates]
+    density = np.array([SMOOTHED[name] for name in names])
     W = np.eye(k) * density / batch.h[..., None, None]
     R = np.where(np.isfinite(q), (batch.sigma / slope) ** 2, np.inf)
     H = np.broadcast_to(np.hstack([np.eye(k), np.zeros((k, k))]), (*q.shape[:2], k, 2 * k))
-    P0 = np.broadcast_to(
-        np.diag([settings.position] * k + [settings.velocity] * k), (q.shape[1], 2 * k, 2 * k)
-    )
+    P0 = np.broadcast_to(np.diag([ANYWHERE] * k + [ANYHOW] * k), (q.shape[1], 2 * k, 2 * k))
     system = System(F, G, W, H, R, P0)
     x, w = smooth(system, gains(system), q, np.zeros((*q.shape[:2], k)))
     return Reference(x[..., :k], x[..., k:], np.where(batch.valid[..., None], w, 0.0))

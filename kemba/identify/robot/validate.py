@@ -1,7 +1,7 @@
-"""Robot logs that contradict themselves or any model: signs turned, valves mixed up, clocks apart.
+"""Robot logs that contradict themselves or any model: commands mixed up, clocks apart.
 
-Torques enter the model's motion linearly, so that the residual of the other sign is known without
-another fit. Valves act through the air: each hypothesis about them is a log of its own.
+What a command does shows in the motion only: each mistake about commands is judged by the filter's
+residual of the whole log along the same measured motion.
 """
 
 from __future__ import annotations
@@ -13,70 +13,48 @@ from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array, Flags, Rows
+from kemba.identify.robot.batch import Batch
+from kemba.identify.robot.mix_ups import SAME, command_mix_ups, corrected
 from kemba.identify.robot.state import LinearisedState
-from kemba.trajectory import Trajectory
 
 HINT = "correct it in a column map (--map)"
-BETTER = 1.5  # factor by which the other sign of torques must leave less
+BETTER = 1.5  # factor by which a log must err less without a mistake about its commands
 
 
-def valve_mix_ups(
-    logs: Sequence[Trajectory], legs: Sequence[str]
-) -> Iterator[tuple[str, list[Trajectory]]]:
-    """Mistakes about valves in words, and the logs with each put right."""
-    sides = ("extend", "retract")
-    swapped = {
-        f"{leg}/valve/{a}": f"{leg}/valve/{b}" for leg in legs for a, b in (sides, sides[::-1])
-    }
-    yield ("valve/extend and valve/retract are swapped", [_taken(log, swapped) for log in logs])
-    same = {name: name for name in swapped}
-    yield (
-        "valve/extend and valve/retract are inverted (1 is on)",
-        [_taken(log, same, inverted=True) for log in logs],
-    )
-    if len(legs) == 2:
-        crossed = {f"{a}/valve/{side}": f"{b}/valve/{side}" for side in sides
-                   for a, b in (legs, legs[::-1])}  # fmt: skip
-        yield ("the valves of the legs are swapped", [_taken(log, crossed) for log in logs])
-
-
-def _taken(log: Trajectory, source: dict[str, str], inverted: bool = False) -> Trajectory:
-    """The log with columns taken from others."""
-    columns = {f"{name} [1]": log[other] for name, other in source.items()}
-    return log.with_columns({h: 1.0 - y if inverted else y for h, y in columns.items()})
-
-
-def turned_torques(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
-    """The sign of the hips' torques, where the other one leaves much less of the residual r (n,) of
-    the hips of the model as it is."""
-    legs = state.physics.legs
-    hips = [3 + i for i in range(len(legs))]
-    groups = [*([(i,) for i in range(len(legs))] if len(legs) > 1 else []), tuple(range(len(legs)))]
-    columns = {group: _turned_torque_residual(state, group) for group in groups}
-    for run, log in enumerate(state.batch.resampled):
-        own = (rows.run == run) & np.isin(rows.channel, hips)
-        before = float(np.sqrt(np.mean(r[own] ** 2))) if own.any() else 0.0
-        left = {g: float(np.sqrt(np.mean((r + c)[own] ** 2))) for g, c in columns.items()}
-        best = min(left, key=left.__getitem__)
-        if before and left[best] * BETTER < before:
-            whose = "every leg" if len(best) == len(legs) else f"the {legs[best[0]]} leg"
+def mixed_commands(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
+    """The mistake about commands without which the model as it is leaves much less than the
+    residual r (n,), run by run, with all that leave as little."""
+    runs = range(len(state.batch.resampled))
+    before = [rms(r[rows.run == i]) for i in runs]
+    if max(before) < BETTER:
+        return  # noise alone leaves one
+    left = {}
+    for mistake in command_mix_ups(state.physics.legs):
+        right = [corrected(log, state.physics, [mistake]) for log in state.batch.resampled]
+        left[mistake.text] = state.commanded(Batch(tuple(right)))
+    for i, log in enumerate(state.batch.resampled):
+        own = rows.run == i
+        after = {text: rms(other[own]) for text, other in left.items()}
+        best = min(after, key=after.__getitem__)
+        power = _power(state.physics.channels, left[best], rows, own)
+        if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
             yield KembaError(
                 log.name,
-                f"hip/tau of {whose} has the reversed sign",
-                f"the hips err by {before:.1f} times their noise from row to row, and by "
-                f"{left[best]:.1f} times with the other sign",
+                "; or ".join(text for text, e in after.items() if e <= SAME * after[best]),
+                f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f} times "
+                "then",
                 HINT,
             )
 
 
-def _turned_torque_residual(state: LinearisedState, legs: Sequence[int]) -> Array:
-    """What the other sign of these legs' torques adds to the residual (n,)."""
-    torque = state.batch.torque
-    force = np.zeros((*torque.shape[:2], state.physics.mechanism.n))
-    for i in legs:
-        force[..., 3 + i] = 2.0 * torque[..., i]
-    pushed = state.pushed(state.motion.response(force)[..., None])
-    return np.asarray(state.pick(pushed)[:, 0])
+def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:
+    """Mistakes that move feet by millimetres, where no lengths make them stand as well."""
+    what = "corrected, feet stand on level ground; else legs of other lengths would be needed"
+    return KembaError(", ".join(runs), "; or ".join(mistakes), what, HINT)
+
+
+def rms(r: Array) -> float:
+    return float(np.sqrt(np.mean(r**2)))
 
 
 # When robot logs contradict themselves or any model.
@@ -84,23 +62,6 @@ DEEP = 0.04  # depth of a foot below the ground that no sensor's fault makes [m]
 OFTEN = 0.03  # share of the rows in which it must be so deep
 ABSURD = 15.0  # rms one-step error, in sigmas, that no missing effect makes
 FAULTY = 4.0  # largest fault of a sensor, in sizes
-
-
-def turned_pitch(runs: Sequence[str]) -> KembaError:
-    """The sign of the pitch, where feet stand with the other one only."""
-    return KembaError(
-        ", ".join(runs),
-        "body/pitch has the reversed sign (nose up is positive)",
-        "corrected, feet stand on level ground; else legs of other lengths would be needed",
-        "correct it with `sign` in a column map (--map)",
-    )
-
-
-def is_absurd(channels: Sequence[str], rows: Rows, r: Array) -> bool:
-    """Whether a channel of a run errs by more than any missing effect makes it, sensors right or
-    wrong."""
-    power = [_power(channels, r, rows, rows.run == i).values() for i in np.unique(rows.run)]
-    return max(max(own, default=0.0) for own in power) > ABSURD
 
 
 def contradictions(

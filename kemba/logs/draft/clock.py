@@ -20,6 +20,8 @@ REPEATED = 0.15  # share of rising steps where up to six topics have rows of one
 RISING = 0.99  # share of steps that must rise: a few repeats are for the gate to tell
 STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
 ALIKE = 0.02  # share by which two clocks of one log may differ
+SURE = (5e-5, 0.05)  # s between rows that leave no doubt about a time in s
+SURE_OF_TICKS = (4e-4, 6e-3)  # and about one in ms, us or ns: 0.1 ms and 100 ns are usual ticks too
 NEAR = 15.0  # scores that differ by less do not decide between clocks that contradict each other
 
 # Scores: what a column is called decides, how it is written breaks ties.
@@ -85,12 +87,13 @@ def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | Non
     best = found[0]
     against = [c for c in found[1:] if best.score - c.score < NEAR and not _agree(best, c)]
     alike = [c for c in found[1:] if c.score > UNNAMED and _agree(best, c)]
-    reason, question = best.reason, ""
+    reason, question = best.reason, best.question
     if alike:
         listed = ", ".join("+".join(c.names) for c in alike[:3])
         reason += f"; as fast as {listed}{' and more' if len(alike) > 3 else ''}"
     if COUNTER < best.score <= UNNAMED:
-        question = f"no column is called a time; is '{best.names[0]}', which rises, one?"
+        asked = f"no column is called a time; is '{best.names[0]}', which rises, one?"
+        question = f"{asked} {question}".strip()
     if against and best.score > UNNAMED:
         other = against[0]
         question = (
@@ -153,14 +156,26 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
     seconds = convert(np.asarray(exact - exact[0], dtype=float), unit, "s")
     from_first = abs(convert(float(rows[np.isfinite(rows)][0]), unit, "s")) > STAMPED
     source = {"source": name, **({} if unit == "s" else {"unit": unit})}
+    question = ""
     if stated is None:
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
-    return Clock(score, source, (name,), seconds, from_first, reason)
+        step = float(np.median(np.diff(seconds)))
+        first, last = SURE if unit == "s" else SURE_OF_TICKS
+        if not (first <= step <= last or _since_1970(rows, unit)):
+            question = (
+                f"are the rows {1e3 * step:.3g} ms apart? '{name}' has no unit: taken as {unit}"
+            )
+    return Clock(score, source, (name,), seconds, from_first, reason, question)
+
+
+def _since_1970(rows: Array, unit: str) -> bool:
+    """Whether stamps in this unit were taken between 1990 and 2100."""
+    return 6e8 < convert(float(rows[np.isfinite(rows)][0]), unit, "s") < 4.1e9
 
 
 def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:
     """The score of a rising column by its name, and why; None where it is something else."""
-    said = words(named_unit(names.labels.get(name, name))[0])
+    said = words(names.bare(name))
     if name == "__time":
         return PLOTTER, "'__time' is the clock that PlotJuggler puts before all topics"
     if says_time(name):

@@ -24,6 +24,7 @@ from kemba.logs.draft.matching import (
     rig_targets,
     robot_targets,
 )
+from kemba.logs.draft.sizes import guessed_units
 from kemba.logs.draft.words import SPELT, Names, is_unit, quaternions, strange_unit, upright
 from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
 from kemba.logs.text import cells_of, encoding, joined
@@ -178,7 +179,7 @@ def draft_map(
     labels = {} if trial.header else joint_state_labels(raw.columns)
     below = zip(raw.columns, units_below(path, layout), strict=False)
     stated = {**_spelt(below), **_spelt(raw.units.items())}
-    names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns))
+    names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns), raw.angles)
     values = numbers(raw.columns, trial.decimal)
     stamp = stamp_of(raw.columns, values, names)
     if stamp is None:
@@ -257,24 +258,24 @@ def _sources(
     turned: Mapping[str, tuple[str, ...]],
 ) -> tuple[dict[str, dict[str, Any]], list[str]]:
     """The source of each of our columns, and what has to be asked about them."""
-    guessed = _guessed_units(names, found.pairs, values, stroke, turned)
+    measured = {h: n for h, n in found.pairs.items() if n not in turned}
+    guessed, asked = guessed_units(names, measured, values, stroke)
     columns: dict[str, dict[str, Any]] = {}
-    asked = []
     for target in targets:
         name = found.pairs.get(target.header)
         if name is None:
             continue
-        unit = names.unit(name) or guessed.get(matching.alike(target.header))
+        unit = names.unit(name) or guessed.get(target.header)
         if name in turned:
             columns[target.header] = {"source": list(turned[name])}
         else:
             columns[target.header] = _source(target, name, unit, values[name])
-        asked += _asked(target, name, names, values[name])
+        asked += _asked(target, name, names)
     _share_level(columns, found.pairs, values)
     return columns, asked
 
 
-def _asked(target: Target, name: str, names: Names, y: Array) -> list[str]:
+def _asked(target: Target, name: str, names: Names) -> list[str]:
     """What a person has to say about a column that was found."""
     found = []
     written = names.labels.get(name, name)
@@ -283,36 +284,6 @@ def _asked(target: Target, name: str, names: Names, y: Array) -> list[str]:
         found.append(f"{target.header}: '{name}' is in '{strange}', which is no unit that is known")
     if "desired" in names.says(name).get("role", ()) and not target.is_command:
         found.append(f"{target.header}: '{name}' is what was asked for; which column is measured?")
-    turns = target.header == "axis/q [rad]" and names.unit(name) is None
-    if turns and float(np.nanmax(np.abs(y), initial=0.0)) > dict(matching.ANGLE)["rad"]:
-        found.append(f"{target.header}: '{name}' has no unit, and may be degrees or several turns")
-    return found
-
-
-def _guessed_units(
-    names: Names,
-    pairs: Mapping[str, str],
-    values: Mapping[str, Array],
-    stroke: float | None,
-    turned: Collection[str],
-) -> dict[str, str]:
-    """The units of columns that are alike, where nothing tells them: those of the others in the
-    log, else by the size of all together, since a jump on the spot has small `x` and pitch. Of
-    lengths the height tells most: a way forward may be any."""
-    found: dict[str, str] = {}
-    for group in {matching.alike(header) for header in pairs}:
-        own = {
-            header: name
-            for header, name in pairs.items()
-            if matching.alike(header) == group and "valve/" not in header and name not in turned
-        }
-        told = {names.unit(name) for name in own.values()} - {None}
-        sized = {h: n for h, n in own.items() if h == "body/z [m]"} or own
-        size = np.concatenate([values[name] for name in sized.values()] or [np.zeros(0)])
-        header = next(iter(own), "[1]")
-        unit = told.pop() if len(told) == 1 else matching.guessed_unit(header, size, stroke)
-        if unit is not None:
-            found[group] = unit
     return found
 
 

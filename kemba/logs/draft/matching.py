@@ -1,13 +1,12 @@
 """Which foreign column is which of ours: the assignment that agrees best with all names."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from kemba.logs.draft.words import Meaning, Names, named_unit, unknown
+from kemba.logs.draft.words import Meaning, Names, unknown, without_sensors
 from kemba.quantity import convert
 from kemba.trajectory import Array
 
@@ -122,39 +121,10 @@ def _supply() -> Target:
     return Target("supply/P [Pa]", {"part": "supply", "kind": "pressure"})
 
 
-# Per SI unit: (unit, largest magnitude of a typical value in it). The first that fits is taken.
-# Robots of 0.1 to 2 m, strokes below 0.3 m, pressures of 0.5 to 12 bar, 50 Hz to 10 kHz.
-LENGTH = (("m", 3.0), ("cm", 60.0), ("mm", 3e3), ("um", 3e6))
-EXTENSION = (("m", 0.5), ("mm", 500.0), ("um", 5e5))
-LENGTHS = ("m", "cm", "mm", "um")
-ANGLE = (("rad", 6.6), ("deg", 400.0), ("mrad", 7e3))
-PRESSURE = (("MPa", 0.05), ("bar", 20.0), ("kPa", 2e3), ("mbar", 2e4), ("Pa", 2e6))
+# Unit of a time, and the largest step in it that is usual: 50 Hz to 10 kHz.
 STEP = (("s", 0.05), ("ms", 50.0), ("us", 5e4), ("ns", 5e7))
 ABSOLUTE = 0.8e5  # Pa; a pressure that falls below it is counted from the atmosphere
 ATMOSPHERE = "1.01325 bar"
-
-
-def guessed_unit(header: str, values: Array, stroke: float | None = None) -> str | None:
-    """The unit of a column by its values, or those of all that are `alike`; None where it is ours
-    or cannot be told. That of a piston makes most of them the `stroke` [m]."""
-    unit = header[header.index("[") + 1 : -1]
-    table = {"m": EXTENSION if "piston/" in header else LENGTH, "rad": ANGLE, "Pa": PRESSURE}
-    size = float(np.nanmax(np.abs(values), initial=0.0))
-    if "piston/x" in header and stroke and size:
-        far = {name: abs(math.log10(convert(size, name, "m") / stroke)) for name in LENGTHS}
-        best = min(far, key=far.__getitem__)
-        return None if best == "m" else best
-    for name, largest in table.get(unit, ()):
-        if size <= largest:
-            return None if name == unit else name
-    return None
-
-
-def alike(header: str) -> str:
-    """What columns have in common that one log gives in one unit: all angles, all pistons. Force
-    sensors are told apart: each has its own amplifier."""
-    unit = header[header.index("[") + 1 : -1]
-    return header if unit == "N" else f"piston {unit}" if "piston/" in header else unit
 
 
 def time_unit(values: Array) -> str:
@@ -219,13 +189,18 @@ def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target
     columns = list(values)
     scores = np.full((len(targets), len(columns)), NOTHING)
     for j, name in enumerate(columns):
-        strangers = min(unknown(named_unit(names.labels.get(name, name))[0], names.legs), 3)
+        bare, unit = names.bare(name), names.unit(name)
+        plain = without_sensors(bare)
+        strangers = min(unknown(plain, names.legs) + (plain != bare), 3)
+        whole, short = names.says(name), names.says(name, sensors=False)
         for i, target in enumerate(targets):
-            unit = names.unit(name)
             if name in names.switches and not target.is_valve:
                 continue
             if fits(target, unit, values[name]):
-                score = agreement(by_unit(names.says(name), target, unit), target)
+                score = agreement(by_unit(whole, target, unit), target)
+                other = agreement(by_unit(short, target, unit), target)
+                if NOTHING < score < other + UNRELATED:  # what is left says as much
+                    score = other
                 scores[i, j] = score - STRANGER * strangers if score > NOTHING else NOTHING
     scores[scores < ENOUGH] = NOTHING
     total, best = _best(scores)
@@ -304,7 +279,7 @@ def agreement(says: Meaning, target: Target) -> float:
         if group in target.may:
             if target.may[group] not in found:
                 return NOTHING
-            score += SAID_TOO
+            score += SAID_TOO * (target.may[group] != "position")
         elif group not in target.means:
             score -= UNRELATED * (group in ("kind", "leg", "part"))
     if "desired" in says.get("role", ()) and not target.is_valve:

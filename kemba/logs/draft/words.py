@@ -24,7 +24,7 @@ WORDS: dict[str, dict[str, str]] = {
     },
     "kind": {
         "position": "q x pos position ang angle theta enc encoder stroke travel displacement "
-        "winkel weg laser qm xp height",
+        "winkel weg laser lvdt pot potentiometer qm xp height",
         "torque": "tau torque trq tq effort moment drehmoment tm",
         "force": "f force load loadcell cell kraft transducer grf fp fx fy fz",
         "pressure": "p pressure press druck",
@@ -61,6 +61,11 @@ TIMES = (
 FILLERS = frozenset(
     "robot header state states joint joints data value values m s log sensors topic".split()
 )
+# what a quantity was read by: it tells columns of one quantity apart, and makes none the better one
+SENSORS = frozenset(
+    "laser lidar enc encoder imu motor joint qdd mocap vicon optitrack camera ekf kf odom boom "
+    "lvdt pot potentiometer".split()
+)
 LEG_WORDS = {
     "front": "front f fore fr vorn vorne vo",
     "rear": "rear back hind b r h hinten hi",
@@ -86,22 +91,28 @@ Meaning = dict[str, set[str]]
 @dataclass(frozen=True)
 class Names:
     """The names of a log's columns: the machine's legs, what headerless columns are called, units
-    that the file states apart, and columns that say `on` and `off`."""
+    that the file states apart, columns that say `on` and `off`, and the unit of all angles."""
 
     legs: Sequence[str] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
     below: Mapping[str, str] = field(default_factory=dict)
     switches: Collection[str] = ()
     columns: Collection[str] = ()
+    angles: str = ""
 
     def unit(self, name: str) -> str | None:
         """The unit that a column's name tells, else the one that the file states."""
         return named_unit(self.labels.get(name, name))[1] or self.below.get(name)
 
-    def says(self, name: str) -> Meaning:
-        """What a column's name may mean: per group, the candidates of its words. `y` is up where no
-        column is `z`; the angle about it is the pitch."""
-        found = meaning(named_unit(self.labels.get(name, name))[0], self.legs)
+    def bare(self, name: str) -> str:
+        """A column's name, or what it is called where it has none, without the unit."""
+        return named_unit(self.labels.get(name, name))[0]
+
+    def says(self, name: str, sensors: bool = True) -> Meaning:
+        """What a column's name may mean: per group, the candidates of its words, those for sensors
+        among them or not. `y` is up where no column is `z`; the angle about it is the pitch."""
+        bare = self.bare(name)
+        found = meaning(bare if sensors else without_sensors(bare), self.legs)
         direction = found.get("direction", set())
         if "y" in direction:
             turning = set(words(name)) & {"rpy", "euler"}
@@ -205,6 +216,11 @@ def _without_leg(found: Meaning, said: Sequence[str], legs: Sequence[str]) -> No
             found[group] -= alone
             if not found[group]:
                 del found[group]
+
+
+def without_sensors(name: str) -> str:
+    """A name without the words that say what it was read by."""
+    return WORD.sub(lambda m: "" if m[0].lower() in SENSORS else m[0], name)
 
 
 def unknown(name: str, legs: Sequence[str]) -> int:

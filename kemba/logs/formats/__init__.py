@@ -5,6 +5,7 @@ opened. A new format is a line of `READERS`.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,17 @@ READERS = {
     **MODULES, "db3": "rosbag2", "mf4": "measured", "mdf": "measured", "tdms": "measured",
     "ulg": "measured", "lvm": "lines", "sto": "lines", "mot": "lines",
 }  # fmt: skip
+UNREAD = {  # endings of files that are not read: what they are, and the way out
+    "bag": ("a bag of ROS 1", "rosbags-convert --src FILE --dst FOLDER makes one of ROS 2 of it"),
+    "hdf5 h5 hdf nc": (
+        "an HDF5 file",
+        "write its columns as CSV, Parquet or, in MATLAB, with -v7.3",
+    ),
+    "xlsx xls xlsm ods": ("a workbook", "save its sheet as CSV"),
+    "blf": ("a log of CAN frames", "decode it with its DBC file into MDF, as asammdf does"),
+    "pkl pickle": ("a file of Python objects, which run code when read", "write it as Parquet"),
+    "zip gz bz2 zst 7z tar": ("packed", "unpack it"),
+}
 SAME = {"mdf": "mf4", "mot": "sto"}  # older endings of formats
 FOLDER = "db3"  # the ending whose reader takes the folder of a rosbag2
 
@@ -39,6 +51,19 @@ def writer(path: Path) -> Write:
     ending = _ending(path)
     found: Write = getattr(_module(path, MODULES[ending]), f"write_{ending}")
     return found
+
+
+def check_read(path: Path) -> None:
+    """Raises KembaError where a file is of a format that is not read, with the way out."""
+    ending = path.suffix.lstrip(".").lower()
+    for endings, (what, way_out) in UNREAD.items():
+        if ending in endings.split():
+            raise KembaError(str(path), f"is {what}, which kemba does not read", hint=way_out)
+    with suppress(OSError), path.open("rb") as stream:
+        start = stream.read(1024)
+        if ending not in READERS and b"\0" in start and start[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+            expected = f"a table of text was expected, or one of .{', .'.join(READERS)}"
+            raise KembaError(str(path), "is no text, and of no format that is known", expected)
 
 
 def check_size(path: Path, unpacked: int) -> None:

@@ -10,7 +10,6 @@ from kemba.logs.recording import Raw, Recording
 from kemba.logs.text import encoding, numbered
 
 LVM_END = "***End_of_Header***"
-TRANSLATION = ("_tx", "_ty", "_tz")  # coordinates of OpenSim that are lengths
 
 
 def read_lvm(path: Path) -> Recording:
@@ -66,7 +65,7 @@ def _lvm_columns(
 
 def read_sto(path: Path) -> Recording:
     """OpenSim's storage: a header up to `endheader`, then names and numbers; `inDegrees` holds for
-    all coordinates that are angles. Raises KembaError where the file is of another form."""
+    the columns that are angles alone. Raises KembaError where the file is of another form."""
     lines = _lines(path)
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):
@@ -75,11 +74,8 @@ def read_sto(path: Path) -> Recording:
     first = next(i for i in range(end + 1, len(lines)) if lines[i].strip())
     names = numbered(lines[first].split(), len(lines[first].split()))
     table = _table(path, lines[first + 1 :], None, ".", len(names), first + 2)
-    units = {"time": "s"}
-    if "indegrees=yes" in above:
-        turning = [name for name in names[1:] if not name.endswith(TRANSLATION)]
-        units |= dict.fromkeys(turning, "deg")
-    return Recording(dict(zip(names, table.T, strict=True)), units=units)
+    angles = "deg" if "indegrees=yes" in above else "rad"
+    return Recording(dict(zip(names, table.T, strict=True)), units={"time": "s"}, angles=angles)
 
 
 def _lines(path: Path) -> list[str]:

@@ -16,8 +16,8 @@ import numpy as np
 
 from kemba.effects.mechanics.ground import Contact
 from kemba.events import LASTS, PLANNED, read
+from kemba.mechanism.knee import felt
 from kemba.model import Model
-from kemba.model.impact import felt
 from kemba.ocp.task.expressions import along
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task

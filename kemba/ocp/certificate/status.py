@@ -87,9 +87,9 @@ def _worst(certificate: Certificate) -> str:
         return "nothing is violated"
     v = certificate.worst[0]
     off = f"off by {v.violation:.3g} {v.unit}"
-    if v.unit.endswith(OF_WEIGHT):  # of a pair, one of which must be zero
-        unit = v.unit.removesuffix(OF_WEIGHT)
-        off = f"which excludes its force: both at once, {v.violation:.3g} {unit}times the weight"
+    if v.unit.endswith(OF_WEIGHT):
+        product = f"{v.violation:.3g} {v.unit}"
+        off = f"where gap (or slip) and force exclude each other: their product is {product}"
     return f"worst: {law(v.what)}, {off} at node {v.node} ({v.time_s:.3f} s)"
 
 
@@ -98,5 +98,7 @@ def law(what: str) -> str:
     kind, _, name = what.partition(":")
     if kind in LAWS:
         return f"{LAWS[kind]} of {name}"
+    if kind.endswith("/end_stop"):
+        return f"the {name} end stop of {kind.removesuffix('/end_stop')}"
     asked = "." in kind or "/" in name  # `goals.apex:body/z`, unlike `rear/contact:gap`
     return f"`{kind}` on {name}" if asked else f"{name.replace('_', ' ')} of {kind}"

@@ -1,4 +1,9 @@
-"""The earlier plan solved again for changed figures, on its own phases."""
+"""The earlier plan solved again for changed figures, on its own phases; or with its valve edges on
+the ticks of the controller.
+
+A table with many short pulses loses millimetres when its edges are rounded afterwards. With the
+edges on ticks beforehand the plan is the best one that a table can hold.
+"""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -10,26 +15,24 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.ocp.certificate.objective import objective
+from kemba.ocp.certificate.certify import objective
 from kemba.ocp.continuation.origin import Origin, completed
+from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.phases.independent import ContradictionError
-from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.notes import noted_phases
+from kemba.ocp.phases.mode_constraints import ContradictionError
+from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.phases.ticks import on_ticks
 from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
-from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.solve import solve, warm
-from kemba.ocp.refinement.start import on_elements
+from kemba.ocp.refinement.start import certificate, on_elements, solve, to_trajectory, warm
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.layout import STEP
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.trajectory import Array, Trajectory
@@ -277,3 +280,55 @@ def _resampled(plan: Trajectory, phases: Sequence[Phase], counts: Sequence[int])
             columns[header].append(np.interp(clock, t[rows], values[rows]))
     joined: dict[str, Array] = {header: np.concatenate(parts) for header, parts in columns.items()}
     return Trajectory(np.concatenate(clocks), joined, plan.meta)
+
+
+def edge_times(
+    model: Model, reduction: Reduction, phases: Sequence[Phase], borders: np.ndarray
+) -> dict[int, float]:
+    """When [s] phases that begin with a valve edge should begin, so that all edges are on ticks.
+
+    `borders` (phases,): when they begin now; the first one stays at 0. Where edges of one moment
+    have dead times that are no whole ticks apart, the first valve decides.
+    """
+    valves, edges, owners = _valves(model, reduction), [], []
+    longest = max(max(model.timing(leg)) for leg in model.mechanism.legs)
+    lead = float(np.ceil(longest / PERIOD))  # commands come before what they do
+    for j, (leg, force) in enumerate(valves):
+        dead = model.timing(model.mechanism.legs[leg])
+        before = 0.0
+        own: list[tuple[int, float]] = []
+        ticks: list[float] = []
+        for p, phase in enumerate(phases):
+            if phase.valves[j] != before:
+                before = phase.valves[j]
+                own.append((p, dead[0 if before else 1]))
+                ticks.append(lead + (float(borders[p]) - own[-1][1]) / PERIOD)
+        edges.append(ValveEdges(ticks, leg, force))
+        owners.append(own)
+    found: dict[int, float] = {}
+    for own, chosen in zip(owners, rounded(edges), strict=True):
+        for (p, late), tick in zip(own, chosen, strict=True):
+            if p:
+                found.setdefault(p, (tick - lead) * PERIOD + late)
+    return dict(sorted(found.items()))
+
+
+def _valves(model: Model, reduction: Reduction) -> list[tuple[int, float]]:
+    """The leg that each valve of a phase drives, and which way it pushes."""
+    keys = [key for key, q in model.inputs.items() if q.binary]
+    places = [i for i, q in enumerate(model.inputs.values()) if q.binary]
+    B, legs = reduction.B["u"][places], list(model.mechanism.legs)
+    firsts = [int(np.flatnonzero(B[:, j])[0]) for j in range(B.shape[1]) if B[:, j].any()]
+    return [(legs.index(str(keys[i][0])), 1.0 if keys[i][1] == "u_e" else -1.0) for i in firsts]
+
+
+def on_ticks(program: PhaseProgram, x: np.ndarray) -> None:
+    """Add the rows that keep the valve edges of a program on ticks, rounded from those of x
+    (size,)."""
+    h, phases = program.columns.h[:, 0], program.phases
+    lasts = np.array([phase.elements * x[h[p]] * STEP for p, phase in enumerate(phases)])
+    borders = np.concatenate([[0.0], np.cumsum(lasts)[:-1]])
+    for p, time in edge_times(program.model, program.reduction, phases, borders).items():
+        z = ca.SX.sym("h", p)
+        begins = ca.dot(z, ca.DM([phase.elements for phase in phases[:p]]))
+        program.add("valve edge", z, begins, time / STEP, time / STEP, [h[:p]])

@@ -1,9 +1,17 @@
-"""What is asked of a nonlinear program and of its functions."""
+"""What is asked of a nonlinear program and of its functions; and terms added to them.
 
+A proximal term is a small cost on the distance from the start. Where the cost is flat, as for
+forces that legs share, Newton steps become long without any gain and lose feasibility. The proximal
+term gives these directions curvature and hardly moves the optimum.
+"""
+
+from functools import cached_property
 from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
+
+from kemba.settings import Settings, setting
 
 
 class Derivatives(Protocol):
@@ -62,3 +70,70 @@ def violation(program: Program, g: np.ndarray) -> float:
     """The largest violation of the rows at values g (rows,), scaled as the rows are."""
     over = np.maximum(program.g_lower - g, g - program.g_upper)
     return float(over.max(initial=0.0))
+
+
+class Newton(Settings):
+    """Newton steps, starts and the stagnation test."""
+
+    regularisation: float = setting(
+        2e-3, "1", "multiple of the identity in the Hessian of whole robots, per scaled variable; "
+        "IPOPT's own additions are 1e-4 to 1", "tuned: benchmarks/variants.py", decides=True,
+    )  # fmt: skip
+    progress: float = setting(
+        0.8, "1", "part of the violation that may be left for a solve to count as progressing",
+        "convention: a fall by a fifth", decides=True,
+    )  # fmt: skip
+
+
+class Proximal:
+    """A problem with weight / 2 |x - start|^2 added to its cost; its parameters become
+    [p, weight, start]. Ready for `ca.nlpsol` like the problem itself."""
+
+    def __init__(self, problem: NlpFunctions) -> None:
+        self.problem = problem
+        weight, start = ca.MX.sym("weight"), ca.MX.sym("start", problem.size)
+        self.x, self.weight = problem.x, weight
+        self.parameters = ca.vertcat(problem.parameter, weight, start)
+        self.away = self.x - start
+
+    @property
+    def nlp(self) -> dict[str, ca.MX]:
+        """x, p, f and g as expressions."""
+        nlp = self.problem.nlp
+        return {**nlp, "p": self.parameters, "f": nlp["f"] + self._cost}
+
+    @cached_property
+    def grad_f(self) -> ca.Function:
+        """(x, p) -> f and its gradient."""
+        f, gradient = self.problem.grad_f(self.x, self.problem.parameter)
+        results = [f + self._cost, gradient + self.weight * self.away]
+        at = [self.x, self.parameters]
+        return ca.Function("grad_f", at, results, ["x", "p"], ["f", "grad_f_x"])
+
+    @cached_property
+    def jac_g(self) -> ca.Function:
+        """(x, p) -> g and its Jacobian."""
+        results = self.problem.jac_g(self.x, self.problem.parameter)
+        at = [self.x, self.parameters]
+        return ca.Function("jac_g", at, list(results), ["x", "p"], ["g", "jac_g_x"])
+
+    @cached_property
+    def hess_lag(self) -> ca.Function:
+        """(x, p, lam_f, lam_g) -> upper triangle of the Lagrangian's Hessian."""
+        lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.problem.rows)
+        plain = self.problem.hess_lag(self.x, self.problem.parameter, lam_f, lam_g)
+        hessian = plain + lam_f * self.weight * ca.MX.eye(self.problem.size)
+        at = {"x": self.x, "p": self.parameters, "lam_f": lam_f, "lam_g": lam_g}
+        result = ["triu_hess_gamma_x_x"]
+        return ca.Function("hess_lag", list(at.values()), [hessian], list(at), result)
+
+    @property
+    def _cost(self) -> ca.MX:
+        return ca.MX(self.weight / 2 * ca.sumsqr(self.away))
+
+
+def regularised_hessian(hess_lag: ca.Function) -> ca.Function:
+    """(x, p, lam_f, lam_g) -> upper triangle (n, n) of the regularised Hessian."""
+    at = hess_lag.mx_in()
+    hessian = hess_lag(*at) + Newton.current().regularisation * ca.MX.eye(hess_lag.size1_out(0))
+    return ca.Function("hess_lag", at, [hessian], hess_lag.name_in(), hess_lag.name_out())

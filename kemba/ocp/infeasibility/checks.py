@@ -1,15 +1,19 @@
-"""Before solving: what can be said in milliseconds about a task that cannot be met.
+"""Before solving: what can be said in milliseconds about a task that cannot be met: contradictions,
+impossible poses, and energy, time and friction against what the robot can give.
 
 A certain diagnostic refuses the task; the others become hints if solving fails.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import groupby
+
+import numpy as np
 
 from kemba.config import Document
 from kemba.config.document import Location
 from kemba.model import Model
-from kemba.ocp.infeasibility.budget import budget_diagnostics
+from kemba.model.rest import at_rest
 from kemba.ocp.infeasibility.diagnostic import (
     Diagnostic,
     key,
@@ -19,11 +23,131 @@ from kemba.ocp.infeasibility.diagnostic import (
     relax,
     spoken,
 )
-from kemba.ocp.infeasibility.flight import AskedFlight, flight_of
 from kemba.ocp.infeasibility.pose import Gap, Poses
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.task.terrain import ground_at, stands
 from kemba.quantity import Quantity
+
+
+@dataclass(frozen=True)
+class AskedFlight:
+    """A height that asks for a flight, and what is known about it before solving.
+
+    z0, z1 [m]: heights of the body at the start, and at the landing if there is one; mass [kg],
+    fall [m.s-2] with boom and payload; swing [m]: how far moving legs shift the body against the
+    centre of mass at most; `stays_below`: the height is the highest point.
+    """
+
+    requirement: Requirement
+    height: float
+    z0: float
+    z1: float | None
+    mass: float
+    fall: float
+    swing: float
+    stays_below: bool
+
+    def least_time(self, other: float, generous: bool) -> float:
+        """Seconds between the apex and the height `other` [m], at least.
+
+        The ground only pushes: the centre of mass accelerates downwards by `fall` at most.
+        `generous`: the motion of the legs may add their swing to the body's height.
+        """
+        lent = self.swing if generous else 0.0
+        way = max(self.height - other - lent, 0.0)
+        return float(np.sqrt(2 * way / self.fall) - np.sqrt(2 * lent / self.fall))
+
+    def most(self, other: float, span: float) -> float:
+        """The greatest height [m] that `span` seconds from or to the height `other` allow."""
+        lent = float(np.sqrt(2 * self.swing / self.fall))
+        return other + self.swing + self.fall * (span + lent) ** 2 / 2
+
+
+def flight_of(
+    model: Model, requirements: Sequence[Requirement], poses: Poses
+) -> AskedFlight | None:
+    """The flight to the greatest height that is required of the body, from a start at rest."""
+    highest = [
+        w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
+    ]
+    start = [w for w in requirements if w.at == 0.0]
+    resting = any(w.location[-1] == "rest" for w in start)
+    grounded = any(stands(model, w) for w in start)
+    if not highest or not resting or not grounded:
+        return None
+    requirement = max(highest, key=lambda w: w.lower)
+    robot = model.mechanism.need_robot()
+    leg = robot.leg.femur.length + robot.leg.tibia.length
+    first, last = (ground_at(model, requirements, at) for at in (0.0, 1.0))
+    if requirement.lower <= max(first, last) + leg:
+        return None
+    mass, weight = inertia_and_weight(model)
+    end = [w for w in requirements if w.at == 1.0]
+    lands = any(stands(model, w) for w in end)
+    below = [w for w in requirements if w.quantity.name == "body/z" and w.always]
+    return AskedFlight(
+        requirement,
+        requirement.lower,
+        poses.highest(start) or leg + first,
+        (poses.highest(end) or leg + last) if lands else None,
+        mass,
+        weight / mass,
+        leg_swing(model) / mass,
+        any(w.upper <= requirement.lower for w in below),
+    )
+
+
+def leg_swing(model: Model) -> float:
+    """How far moving legs can shift the centre of mass at most, times the mass [kg.m]."""
+    robot = model.mechanism.need_robot()
+    leg = robot.leg
+    shank = leg.femur.length + leg.tibia.com
+    rod = leg.piston.mount + leg.piston.retracted + robot.stroke
+    arms = leg.femur.mass * leg.femur.com + leg.tibia.mass * shank
+    arms += leg.cylinder.mass * (leg.piston.mount + leg.cylinder.com) + leg.rod.mass * rod
+    return 2 * len(robot.legs) * arms
+
+
+def inertia_and_weight(model: Model) -> tuple[float, float]:
+    """What the body's height feels in free fall: mass [kg] and weight [N], all effects counted."""
+    node = model.node
+    row = [c.name for c in model.mechanism.coordinates].index("body/z")
+    q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
+    still, s = np.zeros(len(q)), np.array([x.value for x in model.states.values()])
+    sd, lam, u, p = (np.zeros(x.numel()) for x in (node.sd, node.lam, node.u, node.p))
+
+    def force(a: float) -> float:
+        up = a * (np.arange(len(q)) == row)
+        found = node.residual(q, still, up, s, sd, lam, u, p)
+        return float(found[0][row])
+
+    return abs(force(1.0) - force(0.0)), abs(force(0.0))
+
+
+def air_work(model: Model) -> float:
+    """Energy [J] that all pistons give over one stroke, at their steady force from the supply."""
+    node, stroke = model.node, model.mechanism.stroke
+    q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
+    v, lam = np.zeros(len(q)), np.zeros(node.lam.numel())
+    u = np.array([float(symbol == "u_e") for _, symbol in model.inputs])
+    s = at_rest(model, q, u)
+    p = np.zeros(node.p.numel())
+    measured = np.array(node.measure(q, v, v, s, 0 * s, lam, u, p)).ravel()
+    forces = [
+        value
+        for quantity, value in zip(node.output_quantities, measured, strict=True)
+        if quantity.name.endswith("piston/F")
+    ]
+    return float(sum(max(f, 0.0) for f in forces) * stroke)
+
+
+def hip_power(model: Model) -> float:
+    """Mechanical power [W] of all hips at most: peak torque at no-load speed, generously."""
+    hips = [e for e in model.effects if e.kind == "motor"]
+    legs = len(model.mechanism.legs)
+    return sum(float(e.value("tau_peak") * e.value("w_noload")) * legs for e in hips)
+
 
 # s; longest step with which a valve can be timed within a push, which is only a few of these long
 LONGEST = 0.05
@@ -174,3 +298,109 @@ def coarse_grid(task: Task, flight: AskedFlight | None, document: Document) -> I
         f"{1e3 * LONGEST:.0f} ms, so at least {enough} nodes"
     )
     yield Diagnostic(sentence, True)
+
+
+HEAVY = 0.2  # payload of all that is lifted, from which it is named as a cause
+FORWARD = 0.01  # m, way forward that needs friction of the ground: less is within the legs' swing
+
+
+STROKES = 3  # pushes in one motion, as none has more; a task that needs more energy is refused
+
+
+def budget_diagnostics(
+    task: Task,
+    model: Model,
+    requirements: Sequence[Requirement],
+    flight: AskedFlight | None,
+    document: Document,
+) -> Iterator[Diagnostic]:
+    """Time, energy, valves and friction of a task."""
+    if flight is not None:
+        yield from _time(task, flight, document)
+        yield from _energy(task, model, flight, document)
+    yield from _grip(model, requirements, document)
+
+
+def _time(task: Task, flight: AskedFlight, document: Document) -> Iterator[Diagnostic]:
+    """Rise to the apex and fall from it within the longest steps allowed."""
+    longest = task.duration * (1 + task.step_variation)
+    before = longest * (flight.requirement.at or 0.0)
+    spans = []
+    if flight.stays_below and before < longest:
+        spans.append(("rise", flight.z0, before))
+        if flight.z1 is not None:
+            spans.append(("fall", flight.z1, longest - before))
+    for what, other, span in spans:
+        needed = flight.least_time(other, generous=False)
+        if needed <= span:
+            continue
+        certain = flight.least_time(other, generous=True) > span * (1 + 1 / task.nodes)
+        most = relax(document, flight.requirement, flight.height, flight.most(other, span))
+        way = number(flight.height - other, "m")
+        reason = (
+            f"{key('duration', document)}: a {what} of {way} takes {needed:.2f} s, "
+            f"{task.duration:g} s in all leave at most {span:.2f} s for it"
+        )
+        if certain:
+            yield Diagnostic(f"{most.placed()}; {reason}", True, (most,), cause=True)
+        else:
+            yield Diagnostic(reason, False, cause=True)
+        return
+
+
+def _energy(
+    task: Task, model: Model, flight: AskedFlight, document: Document
+) -> Iterator[Diagnostic]:
+    """Work of the air over the stroke against the lift, hips counted generously."""
+    air, lift = air_work(model), flight.mass * flight.fall * (flight.height - flight.z0)
+    asked = f"`{flight.requirement.text}` ({place(document, flight.requirement.location)})"
+    off = _pistons_off(task, document)
+    air = 0.0 if off else air
+    if lift <= air:
+        return
+    longest = task.duration * (1 + task.step_variation) * (flight.requirement.at or 1.0)
+    causes = [f"{off} keeps the pistons without air"] if off else []
+    if task.payload > HEAVY * flight.mass:
+        causes.append(f"{key('payload', document)} adds {number(task.payload, 'kg')}")
+    lifted = f"{asked}: lifting {flight.mass:.1f} kg to {number(flight.height, 'm')}"
+    most = flight.z0 + air / (flight.mass * flight.fall)
+    yield Diagnostic(
+        "; ".join([*causes, f"{lifted} takes {lift:.0f} J, one stroke of the pistons {air:.0f} J"]),
+        lift > STROKES * air + hip_power(model) * longest,
+        (relax(document, flight.requirement, flight.height, most),),
+        cause=bool(causes),
+    )
+
+
+def _pistons_off(task: Task, document: Document) -> str:
+    """The requirement that keeps every extend valve shut all the time, if there is one."""
+    for pattern, bound in task.bounds.items():
+        closed = bound.equals in (0, 0.0) or bound.at_most in (0, 0.0)
+        if closed and "valve" in pattern and "retract" not in pattern and pattern.startswith("*"):
+            return f"`bounds.{pattern}` ({place(document, ('bounds', pattern))})"
+    return ""
+
+
+def _grip(
+    model: Model, requirements: Sequence[Requirement], document: Document
+) -> Iterator[Diagnostic]:
+    """A jump to another place from rest needs friction."""
+    first = [w for w in requirements if w.at == 0.0 and w.quantity.name == "body/x"]
+    last = [w for w in requirements if w.at == 1.0 and w.quantity.name == "body/x"]
+    resting = any(w.at == 0.0 and w.location[-1] == "rest" for w in requirements)
+    if not (first and last and resting):
+        return
+    way = max(last[0].lower - first[0].upper, first[0].lower - last[0].upper)
+    floors = [e for e in model.effects if e.family == "ground" and "mu" in e.parameters()]
+    if not floors or all(float(e.value("mu")) > 0 for e in floors):
+        return
+    if way < FORWARD:
+        return
+    where = place(document, last[0].location)
+    yield Diagnostic(
+        f"`{last[0].text}` ({where}): {number(way, 'm')} forward asked, but the ground "
+        f"gives no grip: friction coefficient mu is 0 in the model `{model.name}` "
+        f"({floors[0].name}), and without it the centre of mass stays where it starts",
+        way > leg_swing(model) / model.mechanism.mass,
+        cause=True,
+    )

@@ -18,10 +18,9 @@ from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
 from kemba.ocp.task.costs import scaled
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Landing, Task
-from kemba.ocp.transcription.parameters import Parameters
 from kemba.ocp.transcription.stage import StageRows
 from kemba.ocp.transcription.symmetry import Reduction
-from kemba.ocp.transcription.transcribe import RequirementBlock, Transcription
+from kemba.ocp.transcription.transcribe import Parameters, RequirementBlock, Transcription
 
 # What may be violated: goals first; then everything but the start, which is checked before solving.
 TIERS = (("goals",), ("goals", "bounds", "end", "clearance"))

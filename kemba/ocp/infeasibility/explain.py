@@ -1,15 +1,18 @@
-"""Why a task has no plan: violated requirements, by how much, and the limits reached."""
+"""Why a task has no plan: violated requirements, by how much, and the limits of the robot that a
+plan reaches, in words."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from kemba.config import Document
 from kemba.model import Model
 from kemba.ocp.infeasibility.diagnostic import Diagnostic, Relax, one_per_requirement, relax
 from kemba.ocp.infeasibility.elastic import Outcome
-from kemba.ocp.infeasibility.limits import active_limits
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import to_trajectory
+from kemba.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
@@ -64,3 +67,108 @@ def explanation(
     if not (limits or hints):
         return None
     return Explanation("; ".join(["close to a limit", *limits, *hints]), (), False)
+
+
+FULL = 0.99  # part of the stroke that counts as all of it
+OFTEN = 0.3  # part of the steps for which a limit must hold to be named
+GRIP = 0.02  # of body weight: a foot with less normal force does not stand
+SLIDES = 0.02  # m.s-1, slip speed of a sliding foot
+THROUGHOUT = 0.95  # part of the push that counts as all of it
+MOSTLY = 0.6  # part of the push for which open valves are told
+PEAK = 0.95  # part of the peak torque that counts
+STEP = 0.02  # relative distance to a step's bound
+STEPS = 0.8  # part of the steps at a bound that is named
+
+
+def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
+    """Parts of a sentence: `front and rear extension valves are open throughout the push`."""
+    return [
+        *_valves(model, trajectory),
+        *_torques(model, trajectory),
+        *_strokes(model, trajectory),
+        *_grip(model, trajectory),
+        *_steps(task, trajectory),
+    ]
+
+
+def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:
+    """Steps (n,) in which some foot bears load, up to the highest point."""
+    names = [f"{leg}/foot/Fz" for leg in model.mechanism.legs]
+    load = np.array([trajectory[name] for name in names if name in trajectory]).sum(axis=0)
+    bears = np.broadcast_to(load > GRIP * model.mechanism.weight, len(trajectory)).copy()
+    bears[0] = False
+    bears[int(np.argmax(trajectory["body/z"])) + 1 :] = False
+    return np.asarray(bears)
+
+
+def _legs(model: Model, holds: dict[str, bool]) -> str:
+    return " and ".join(leg for leg in model.mechanism.legs if holds.get(leg))
+
+
+def _valves(model: Model, trajectory: Trajectory) -> Iterator[str]:
+    stance = _stance(model, trajectory)
+    if not stance.any():
+        return
+    for chamber in ("extend", "retract"):
+        share = {
+            leg: float(np.mean(trajectory[f"{leg}/valve/{chamber}"][stance] > 0.5))
+            for leg in model.mechanism.legs
+            if f"{leg}/valve/{chamber}" in trajectory
+        }
+        word = "extension" if chamber == "extend" else "retraction"
+        open_ = _legs(model, {leg: x > THROUGHOUT for leg, x in share.items()})
+        most = _legs(model, {leg: MOSTLY < x <= THROUGHOUT for leg, x in share.items()})
+        if open_:
+            yield f"{open_} {word} valves are open throughout the push"
+        elif most and chamber == "extend":
+            yield f"{most} {word} valves are open for {max(share.values()):.0%} of the push"
+
+
+def _torques(model: Model, trajectory: Trajectory) -> Iterator[str]:
+    share: dict[str, float] = {}
+    peak = 0.0
+    for (leg, _), quantity in model.inputs.items():
+        if quantity.unit == "N.m" and leg is not None:
+            peak = max(peak, quantity.upper)
+            at_peak = np.abs(trajectory[quantity.name][1:]) > PEAK * quantity.upper
+            share[leg] = float(np.mean(at_peak))
+    legs = _legs(model, {leg: x >= OFTEN for leg, x in share.items()})
+    if legs:
+        most = f"{max(share.values()):.0%} of the steps"
+        yield f"{legs} hip torque is at its peak of {peak:g} N.m (tau_peak) in {most}"
+
+
+def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
+    stance = np.flatnonzero(_stance(model, trajectory))
+    if not len(stance):
+        return
+    full = {
+        leg: bool(
+            trajectory[f"{leg}/piston/x"][: stance[-1] + 2].max() > FULL * model.mechanism.stroke
+        )
+        for leg in model.mechanism.legs
+    }
+    if any(full.values()):
+        yield f"{_legs(model, full)} pistons use their whole stroke"
+
+
+def _grip(model: Model, trajectory: Trajectory) -> Iterator[str]:
+    slides = {}
+    for leg in model.mechanism.legs:
+        names = [f"{leg}/foot/{part}" for part in ("Fz", "slip")]
+        if not all(name in trajectory for name in names):
+            continue
+        normal, slip = (trajectory[name][1:] for name in names)
+        bears = normal > GRIP * model.mechanism.weight
+        slides[leg] = bool(bears.any() and np.mean(slip[bears] > SLIDES) > OFTEN)
+    if any(slides.values()):
+        yield f"{_legs(model, slides)} feet slip at the edge of the friction cone"
+
+
+def _steps(task: Task, trajectory: Trajectory) -> Iterator[str]:
+    h = np.diff(trajectory.time)
+    nominal = task.duration / len(h)
+    for side, word in ((1 + task.step_variation, "longest"), (1 - task.step_variation, "shortest")):
+        at = np.abs(h / nominal - side) < STEP * side
+        if task.step_variation > 0 and np.mean(at) > STEPS:
+            yield f"the steps are at their {word} (`duration`, `step_variation`)"

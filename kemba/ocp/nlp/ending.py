@@ -8,7 +8,7 @@ from time import thread_time
 
 import numpy as np
 
-from kemba.ocp.functions.proximal import Newton
+from kemba.ocp.functions.problem import Newton
 
 
 class Ending(str, Enum):

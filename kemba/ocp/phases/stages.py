@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kemba.ocp.nlp.ipopt import Iterate
-from kemba.ocp.phases.columns import Columns
 from kemba.ocp.phases.modes import Phase
-from kemba.ocp.phases.program import PhaseProgram
+from kemba.ocp.phases.program import Columns, PhaseProgram
 from kemba.ocp.transcription.layout import STEP, Layout
 
 

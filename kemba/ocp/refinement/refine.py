@@ -13,19 +13,27 @@ from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.phases.independent import ContradictionError, Independent
-from kemba.ocp.phases.mode_constraints import add_mode_constraints
+from kemba.ocp.phases.mode_constraints import (
+    ContradictionError,
+    Independent,
+    add_mode_constraints,
+    add_requirements,
+)
 from kemba.ocp.phases.modes import Phase, read_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
-from kemba.ocp.phases.requirements import add_requirements
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.refinement.insertion import with_pulses
-from kemba.ocp.refinement.repair import misfits, repaired, simplified
-from kemba.ocp.refinement.sample import certificate, to_trajectory
-from kemba.ocp.refinement.solve import rough, solve, warm
-from kemba.ocp.refinement.start import carried, start_vector
+from kemba.ocp.refinement.repair import misfits, repaired, simplified, with_pulses
+from kemba.ocp.refinement.start import (
+    carried,
+    certificate,
+    rough,
+    solve,
+    start_vector,
+    to_trajectory,
+    warm,
+)
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays

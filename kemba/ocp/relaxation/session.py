@@ -11,8 +11,7 @@ import numpy as np
 from kemba.ocp.functions.problem import violation
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Bounds, Control, Ipopt, Iterate
-from kemba.ocp.transcription.parameters import Parameters
-from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.transcription.transcribe import Parameters, Transcription
 from kemba.stopwatch import Stopwatch
 
 

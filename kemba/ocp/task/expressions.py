@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from kemba.effects.dimension import unit_of
-from kemba.effects.formula import evaluate, names_of, parse_formula
+from kemba.effects.formula import evaluate, names_of, parse_formula, unit_of
 from kemba.errors import KembaError, suggest
 from kemba.quantity import Quantity
 from kemba.trajectory import Array, Trajectory

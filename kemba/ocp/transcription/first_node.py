@@ -12,7 +12,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Node
-from kemba.model.node import Row
+from kemba.model.model import Row
 from kemba.ocp.transcription.layout import Layout
 
 SAME = 1e-9  # relative; far above rounding errors

@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.model.node import Row
+from kemba.model.model import Row
 from kemba.ocp.task.costs import running
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import CostTerm

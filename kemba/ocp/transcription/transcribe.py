@@ -13,7 +13,7 @@ m   rows of one step, in this order: defects of kinematics, of motion, of rates;
     pairs; signs of both sides of a pair; limits (see `stage`)
 g   all rows: m rows of step 1, ..., m rows of step N; then the requirements that are no bounds,
     one block each over its nodes; then what holds in every state, at node 0
-p   (5,): relaxation of the pairs and four weights (see `parameters`)
+p   (5,): relaxation of the pairs and four weights (see `Parameters`)
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -23,8 +23,8 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
+from kemba.mechanism.knee import felt
 from kemba.model import Model
-from kemba.model.impact import felt
 from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
@@ -42,6 +42,29 @@ from kemba.ocp.transcription.stage import (
 )
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import rigid_constraints
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """What one solve of a schedule sets.
+
+    `eps`: relaxation of the pairs (body weights times metres or m/s). Weights in the cost:
+    `valve` of u(1 - u) and `switching` of squared changes of u (both per node of the grid's mean),
+    `pairs` of every pair's product, `forces` of squared scaled forces, `proximal` of half the
+    squared distance from the start (scaled variables; not a parameter of the program itself).
+    """
+
+    eps: float
+    valve: float = 0.0
+    switching: float = 0.0
+    pairs: float = 0.0
+    forces: float = 0.0
+    proximal: float = 0.0
+
+    def vector(self, nodes: int) -> list[float]:
+        """The program's parameters p (5,) on a grid of `nodes`."""
+        return [self.eps, self.valve / nodes, self.switching / nodes, self.pairs, self.forces]
+
 
 WITHIN = (0.25, 0.5, 0.75)  # of an interval: where obstacles are looked at besides its end
 RequirementBlock = tuple[RowBlock, StageRows, list[int]]  # with the nodes at which its rows hold

@@ -12,10 +12,9 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.pneumatics.switching import delayed, is_on, pulses
 from kemba.identify.adopt import adopt_effect
-from kemba.identify.bench.motion import SmoothedMotion
-from kemba.identify.bench.prediction import absolute_pressure
+from kemba.identify.bench.bench_log import SmoothedMotion
+from kemba.identify.bench.prediction import RigModel, absolute_pressure
 from kemba.identify.bench.problem import bench_problem
-from kemba.identify.bench.rig_model import RigModel
 from kemba.identify.design.rig import propose
 from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings
 from kemba.identify.infer.linear import Linear, estimate, names_of, priors
@@ -135,7 +134,7 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     log = bench_log()
     model = load_model(rig=True)
     bare = bench_problem([log], model)
-    states = bare.predicted.predictor.predict(bare.logs[0], {}).states
+    states = bare.predictor.predict(bare.logs[0], {}).states
     columns = {
         f"{c} [Pa]": absolute_pressure(c, states, model.mechanism.need_cylinder())
         + 500 * np.random.default_rng(0).standard_normal(len(log))

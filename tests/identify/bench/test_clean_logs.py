@@ -15,7 +15,7 @@ from kemba.identify.bench.bench_log import prepare
 from kemba.identify.bench.clocks import ClockSettings, looked_at
 from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.bench.validate import contradictions
-from kemba.identify.logs.limits import limits_of
+from kemba.identify.logs.gate import limits_of
 from kemba.identify.problem.noise import step_of, telling
 from kemba.identify.workflow import compare_logs, discover_logs
 from kemba.model.spec import load_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from kemba.identify.bench.motion import position_noise, smooth_motion
+from kemba.identify.bench.bench_log import position_noise, smooth_motion
 from kemba.identify.problem.noise import caution, difference_sigma, learn, whiten
 from kemba.identify.problem.sensor_noise import ChannelNoise
 

@@ -9,9 +9,8 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer
-from kemba.identify.logs.excerpt import excerpts
 from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import read_log
+from kemba.identify.logs.reading import excerpts, read_log
 from kemba.identify.workflow import discover_logs
 from kemba.logs import load_map
 from kemba.trajectory import Trajectory

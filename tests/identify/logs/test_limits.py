@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.identify.logs.limits import limits_of
+from kemba.identify.logs.gate import limits_of
 from kemba.trajectory import Trajectory
 
 

@@ -15,7 +15,7 @@ LEGS = ("front", "rear")
 
 @pytest.fixture(scope="module")
 def logs() -> list[Trajectory]:
-    return hops(runs=1)[0]
+    return hops(runs=1, seed=1)[0]
 
 
 def problem(log: Trajectory) -> RobotProblem:
@@ -30,25 +30,34 @@ def test_what_is_right_is_left_alone(logs: list[Trajectory]) -> None:
     problem(logs[0]).validate()
 
 
-@pytest.mark.parametrize("legs", [LEGS, ("rear",)])
-def test_the_sign_of_torques(legs: tuple[str, ...], logs: list[Trajectory]) -> None:
-    log = logs[0]
-    turned = taken(log, {f"{leg}/hip/tau": -log[f"{leg}/hip/tau"] for leg in legs})
-    whose = "every leg" if len(legs) == 2 else "the rear leg"
-    with pytest.raises(BadData, match=f"hip/tau of {whose} has the reversed sign"):
-        problem(turned).validate()
+TORQUES = [f"{leg}/hip/tau" for leg in LEGS]
+SIDES = ("extend", "retract")
+FRONT, REAR = ([f"{leg}/valve/{side}" for side in SIDES] for leg in LEGS)
+# columns, those that each is taken from, whether they are inverted, and the words
+MISTAKES: dict[str, tuple[list[str], list[str], str, str]] = {
+    "torques": (TORQUES, TORQUES, "-", "hip/tau of every leg has the reversed sign"),
+    "a torque": (TORQUES[1:], TORQUES[1:], "-", "hip/tau of the rear leg has the reversed sign"),
+    "legs' torques": (TORQUES, TORQUES[::-1], "", "hip/tau of the legs is swapped"),
+    "valves": ([*FRONT, *REAR], [*FRONT[::-1], *REAR[::-1]], "", "are swapped at every leg"),
+    "a leg's valves": (FRONT, FRONT[::-1], "", "are swapped at the front leg"),
+    "legs' valves": ([*FRONT, *REAR], [*REAR, *FRONT], "", "the valves of the legs are swapped"),
+    "inverted": ([*FRONT, *REAR], [*FRONT, *REAR], "1", r"are inverted \(1 is on\) at every leg"),
+    "a valve": (
+        FRONT[:1],
+        FRONT[:1],
+        "1",
+        r"valve/extend is inverted \(1 is on\) at the front leg",
+    ),
+}
 
 
-@pytest.mark.parametrize("mistake", ["swapped", r"inverted \(1 is on\)"])
-def test_valves(mistake: str, logs: list[Trajectory]) -> None:
-    log, sides = logs[0], ("extend", "retract")
-    change = {}
-    for name in (f"{leg}/valve/" for leg in LEGS):
-        for a, b in (sides, sides[::-1]):
-            swapped = mistake == "swapped"
-            change[name + a] = log[name + b] if swapped else 1.0 - log[name + a]
-    with pytest.raises(BadData, match=f"valve/extend and valve/retract are {mistake}"):
-        problem(taken(log, change)).validate()
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_about_commands(mistake: str, logs: list[Trajectory]) -> None:
+    columns, source, turn, words = MISTAKES[mistake]
+    turned = {"": lambda y: y, "-": np.negative, "1": lambda y: 1.0 - y}[turn]
+    change = {a: turned(logs[0][b]) for a, b in zip(columns, source, strict=True)}
+    with pytest.raises(BadData, match=words):
+        problem(taken(logs[0], change)).validate()
 
 
 def test_a_log_without_torques(logs: list[Trajectory], tmp_path) -> None:  # type: ignore[no-untyped-def]

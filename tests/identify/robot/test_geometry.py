@@ -67,7 +67,7 @@ def test_a_pitch_of_the_other_sign_is_told_where_it_is_small() -> None:
 def test_no_fault_of_the_sensor_is_taken_for_its_sign(change: Callable[[Array], Array]) -> None:
     (log,), _ = hops(runs=1, seed=12, figures_off=0.01)
     problem = robot_problem([with_pitch(log, change)], load_model("planning"))
-    assert not problem.standing.turned
+    assert not problem.mixed
     problem.validate()
 
 

@@ -44,7 +44,7 @@ def standing(physics: Physics) -> ResampledLog:
     fine = np.stack([np.interp(time, time[::20], column) for column in y.T], axis=1)
     unknown = np.full(7, 2e-4), np.full(7, np.nan), np.zeros(7, bool)
     noise = 2e-4 * np.random.default_rng(0).standard_normal(fine.shape)
-    return ResampledLog("leans", time, fine + noise, np.zeros((800, 2)), (), *unknown)
+    return ResampledLog("leans", time, fine + noise, np.zeros((800, 2)), ([],) * 4, *unknown)
 
 
 def changed(
@@ -85,6 +85,18 @@ MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
         r"stand: body/z counts from another zero \(-2\d mm too much\); corrected, it is [0-4] mm",
     ),
     "down": ({"body__z": np.negative}, "body/z counts downwards"),
+    "a hip": (
+        {"rear__hip__q": lambda q: q - 0.15},
+        r"mm from .* stand: hip/q of the rear leg counts from another zero \(-8.\d degrees too",
+    ),
+    "pitch's zero": (
+        {"pitch": lambda p: p + 0.1},
+        r"stand: body/pitch counts from another zero \(\+5.\d degrees too much\); corrected",
+    ),
+    "pistons": (
+        {"piston__x": lambda x: x + 5e-3},
+        r"stand: piston/x of every leg counts from another zero \(\+[45].\d mm too much\); corr",
+    ),
     "two": (
         {"rear__hip__q": np.negative, "front__piston__x": lambda x: 0.07 - x},
         "front leg counts from the extended end and hip/q of the rear leg has the reversed",
@@ -107,6 +119,28 @@ def test_what_feet_cannot_tell_apart_is_all_named(physics: Physics, standing: Re
     """A robot that is its own mirror image stands as well seen from its other side."""
     (fault,) = found(physics, changed(standing, physics, hip__q=np.negative))
     for words in ("of every leg has the reversed sign", "seen from its other side", "cannot tell"):
+        assert words in str(fault)
+
+
+def test_pistons_of_the_legs_are_told_from_the_pitch(
+    physics: Physics, standing: ResampledLog
+) -> None:
+    y = standing.y.copy()
+    y[:, [5, 6]] = y[:, [6, 5]]
+    (fault,) = found(physics, replace(standing, y=y))
+    assert "stand: piston/x of the legs is swapped; corrected" in str(fault)
+
+
+def test_what_feet_cannot_tell_the_model_tells(physics: Physics, standing: ResampledLog) -> None:
+    """Torques have their own sign: the model tells hips from the robot seen from behind."""
+    torque = np.tile([1.0, -2.0], (len(standing.time), 1))
+    turned = replace(changed(standing, physics, hip__q=np.negative), torque=torque)
+    for truth, words in (
+        (torque, "stand: hip/q of every leg has the reversed sign; corrected"),
+        (-torque, "stand: hip/q and hip/tau of every leg have the reversed sign; corrected"),
+    ):
+        off = lambda log, truth=truth: 1.0 + float(np.abs(log.torque - truth).max())  # noqa: E731
+        (fault,) = mixed_up(physics, turned, None, off)
         assert words in str(fault)
 
 
@@ -138,6 +172,9 @@ def test_faults_of_sensors_are_not_taken_for_mistakes(
         {"hip__q": lambda q: 1.05 * q},
         {"pitch": lambda p: p + 0.03},
         {"piston__x": lambda x: np.roll(x, 5)},
+        {"front__piston__x": lambda x: x + 3e-3},
+        {"front__piston__x": lambda x: 1.04 * x},
+        {"hip__q": lambda q: q + 5e-3},
     ):
         assert not found(physics, changed(standing, physics, **changes))
 
@@ -146,7 +183,8 @@ def test_lengths_are_no_zero_of_the_height(physics: Physics, standing: Resampled
     """Where other lengths make the feet stand as well, 20 mm are no zero, 80 mm are one."""
     for off, named in ((0.02, False), (0.08, True)):
         low = changed(standing, physics, body__z=lambda z, off=off: z - off)
-        assert any("another zero" in str(f) for f in mixed_up(physics, low, lengths=True)) is named
+        lengths = {"geometry:tibia/length.d": off}
+        assert any("another zero" in str(f) for f in mixed_up(physics, low, lengths)) is named
 
 
 def test_a_flight_tells_nothing(physics: Physics, standing: ResampledLog) -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kemba.effects.sensors import SensorDelay
-from kemba.identify.robot.batch import ResampledLog
-from kemba.identify.robot.sensing import ahead, sensed, travelled, whole_rows
+from kemba.identify.robot.batch import ResampledLog, ahead, sensed, travelled, whole_rows
 
 TIME = np.arange(0.0, 0.6, 1e-3)
 STEP = np.full((len(TIME), 1), 1e-3)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from kemba.effects.pneumatics.switching import changes, delayed, instants, is_on, pulses
-from kemba.identify.robot.air import substeps
 from kemba.identify.robot.batch import ResampledLog
+from kemba.identify.robot.state import substeps
 from kemba.plant.commands import Profile, acting
 
 TIME = np.arange(400) / 1e3

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from kemba.config import Document
-from kemba.ocp.task.options import option_errors
+from kemba.ocp.task.resolve import option_errors
 
 
 @pytest.mark.parametrize(

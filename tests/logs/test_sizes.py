@@ -1,0 +1,106 @@
+"""Units that nothing tells: by usual sizes, never silently those of another column."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from foreign_files import robot_log
+from strange_logs import PLAIN, UNITS, noisy
+
+from kemba.identify.logs.reading import read_log
+from kemba.logs import load_map
+from kemba.logs.draft.draft import Draft, draft_map
+
+DEGREES = np.degrees(1)
+
+
+def drafted(path: Path, **changes: tuple[str, float]) -> Draft:
+    """The draft of a log in SI units without any named, but for columns that have another `name`
+    and are `factor` times as large."""
+    log = robot_log()
+    table = {"time": log.time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    for column, (name, factor) in changes.items():
+        table[name] = factor * table.pop(column)
+    pd.DataFrame(table).to_csv(path / "log.csv", index=False)
+    return draft_map(path / "log.csv", ("front", "rear"), 0.07)
+
+
+def units(draft: Draft) -> dict[str, str]:
+    return {h.split(" [")[0]: s["unit"] for h, s in draft.columns.items() if "unit" in s}
+
+
+@pytest.mark.parametrize(
+    ("column", "name", "factor", "unit", "open_"),
+    [
+        ("body_z", "body_z_cm", 1e2, "cm", "body/x"),
+        ("body_z", "body_z [ft]", 1 / 0.3048, "ft", "body/x"),
+        ("body_z", "body_z [mm/10]", 1e4, "mm/10", "body/x"),
+        ("front_hip_q", "front_hip_q [mrad]", 1e3, "mrad", "body/pitch"),
+        ("front_hip_tau", "front_hip_tau [mN.m]", 1e3, "mN.m", ""),
+        ("front_hip_tau", "front_hip_tau [Nm]", 1.0, "Nm", ""),
+        ("body_pitch", "body_pitch_deg", DEGREES, "deg", ""),
+        ("front_piston_x", "front_piston_x [mm]", 1e3, "mm", ""),
+        ("rear_hip_tau", "rear_hip_tau", 1e3, "", "hip/tau"),
+    ],
+)
+def test_a_unit_is_that_of_its_own_column(
+    column: str, name: str, factor: float, unit: str, open_: str, tmp_path: Path
+) -> None:
+    draft = drafted(tmp_path, **{column: (name, factor)})
+    path = column.replace("_", "/")
+    if unit:
+        assert units(draft) == {path: unit}
+    assert all(open_ in question for question in draft.questions)
+    assert bool(draft.questions) == bool(open_)
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({"body_z": 1e3}, {"body/z": "mm"}),
+        ({"front_hip_tau": 1e3, "rear_hip_tau": 1e3}, {"front/hip/tau": "mN.m"}),
+        ({"front_hip_q": DEGREES, "rear_hip_q": DEGREES}, {"front/hip/q": "deg"}),
+        ({"body_pitch": 3 * DEGREES}, {"body/pitch": "deg"}),
+    ],
+)
+def test_sizes_tell_units(
+    changes: dict[str, float], expected: dict[str, str], tmp_path: Path
+) -> None:
+    """And where they contradict the others, or leave another unit possible, this is asked."""
+    draft = drafted(tmp_path, **{name: (name, factor) for name, factor in changes.items()})
+    assert expected.items() <= units(draft).items()
+    assert draft.questions or "tau" in str(changes)
+
+
+def test_pressures_in_megapascals(tmp_path: Path) -> None:
+    log = robot_log()
+    table = {n.replace("/", "_"): log[n] for n in log.names}
+    table |= {f"front_{side}_pressure": 0.1 + 0.5 * log[f"front/valve/{side}"]
+              for side in ("extend", "retract")}  # fmt: skip
+    pd.DataFrame({"time": log.time, **table}).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    assert units(draft)["front/chamber/extend/P"] == "MPa"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_columns_with_units_and_without_are_read_right_or_asked_about(
+    seed: int, tmp_path: Path
+) -> None:
+    """Each column in a unit drawn at random, which its header tells or not."""
+    rng = np.random.default_rng(seed)
+    log = noisy(rng)
+    table = {"time": log.time}
+    for name in log.names:
+        unit, size = (ways := UNITS.get(log.unit(name), [("", 1.0)]))[rng.integers(len(ways))]
+        told = unit and rng.random() < 0.5
+        plain = PLAIN.get(log.unit(name), [("", 1.0)])[-1 if rng.random() < 0.3 else 0][1]
+        label = name.replace("/", "_") + (f" [{unit}]" if told else "")
+        table[label] = log[name] * (size if told else plain)
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07)
+    (tmp_path / "map.yaml").write_text(draft.text("log.csv"))
+    back = read_log(tmp_path / "log.csv", load_map(tmp_path / "map.yaml"))
+    for name in log.names:
+        if not any(name in question for question in draft.questions):
+            assert back[name] == pytest.approx(log[name], abs=5e-3), name
