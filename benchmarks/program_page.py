@@ -301,7 +301,8 @@ of arguments) of newer code {drawn} were drawn with seed {bugs[0]["seed"]}
 the folder that mirrors its file's, and those that import its module; tests farther off, which may
 notice it as well, are not asked. {run} were run, not in the order of the draw: where tests are
 quick first. Of the {run - equivalent} that are not equivalent, by hand, these tests noticed
-{share(before, run - equivalent)}; with the tests that were added for the survivors
+{share(before, run - equivalent)}; with the tests that were added for the
+survivors, one of which a test farther off notices,
 {share(since, run - equivalent)}. The latter was aimed at, and says nothing of bugs that were not
 run: of these about as many are noticed as the former says.
 
