@@ -34,12 +34,13 @@ def listed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_a_near_task_begins_from_the_users_plan(tmp_path: Path, listed: Path) -> None:
     first = solve(tmp_path / "first", "hop.yaml")
-    assert first["good"] and first["start"] == "guess" and first["best_known"] is None
+    # which guess leads to the hop hangs on rounding, and so on the machine
+    assert first["good"] and first["start"].startswith("guess") and first["best_known"] is None
     near = solve(tmp_path / "near", "hop.yaml", "--set", "height=0.38 m")
     assert near["good"] and near["start"] == f"run: {tmp_path / 'first'}" and near["continued"]
     assert near["iterations"] < first["iterations"] / 2
     again = solve(tmp_path / "again", "hop.yaml", "--no-memory")
-    assert again["start"] == "guess" and again["best_known"] is None
+    assert again["start"].startswith("guess") and again["best_known"] is None
     assert len(listed.read_text().splitlines()) == 2, "not that without memory"
 
 
