@@ -88,7 +88,7 @@ def mixed_up(
     if error is None or error < STILL:
         return
     known = list(mix_ups(physics.legs, physics.mechanism.stroke))
-    goal = min(SMALL, error / BETTER)
+    goal = min(2.0 * STILL, error / BETTER)
     if lengths:
         goal = min(goal, ALIKE * (feet.restless([], lengths) or goal))
     for count in range(1, 2 if lengths or error < SMALL else 3):
