@@ -158,7 +158,7 @@ bad. Such a machine is not its drawing: its figures are off within the tolerance
 declares, and every effect may be there with 5 % of its size. So p-values are uniform on machines
 drawn like this, and on no others. On a linear problem they are: of 200 machines p-values are
 uniform (Kolmogorov-Smirnov), at most 3 % are false alarms, and 93 to 97 % of the 95 % intervals
-hold the truth (`tests/identify/test_p_value.py`).
+hold the truth (`tests/identify/infer/test_significance.py`).
 
 Bench logs of the twin of the tests, two of 2 s each (`benchmarks/calibration.py`; KS: p of
 Kolmogorov-Smirnov, below 0.05 the p-values are not uniform). p-values are multiples of 1/401, the
