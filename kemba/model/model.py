@@ -77,6 +77,7 @@ class Node:
         return ca.Function("measure", self.symbols, [columns], list(self.NAMES), ["y"])
 
 
+NOMINAL_SUPPLY = 0.7e6  # Pa, of a model that names none
 SUPPLY = "supply"  # its name beside those of parameters
 
 
@@ -92,7 +93,7 @@ class Model:
         self,
         mechanism: Mechanism,
         effects: Iterable[Effect],
-        supply: float = 0.7e6,
+        supply: float = NOMINAL_SUPPLY,
         name: str = "model",
     ) -> None:
         cylinder = mechanism.cylinder

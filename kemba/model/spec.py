@@ -31,7 +31,7 @@ from kemba.mechanism import (
 )
 from kemba.mechanism.robot_file import find_file, robot_files
 from kemba.model.evidence import Array, Evidence, located, matrix_in
-from kemba.model.model import Model
+from kemba.model.model import NOMINAL_SUPPLY, Model
 from kemba.quantity import Param
 from kemba.scene import FLAT, Scene
 
@@ -213,7 +213,7 @@ def build_model(
     if rig:
         listed = [e for e in listed if set(e.ports) <= {"piston"} and e.kind != "end_stop"]
     named = {e.name: e for e in (*listed, *extra)}
-    return Model(mechanism, named.values(), supply or spec.supply or 0.7e6, spec.name)
+    return Model(mechanism, named.values(), supply or spec.supply or NOMINAL_SUPPLY, spec.name)
 
 
 def load_model(

@@ -16,10 +16,11 @@ from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
 from kemba.mechanism import Cylinder, rig_mechanism
 from kemba.model import Model, ModelSpec
+from kemba.model.model import NOMINAL_SUPPLY
 from kemba.plant.commands import Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.rigs import drive, followed
-from kemba.plant.supplies import NOMINAL, tell_supplies
+from kemba.plant.supplies import tell_supplies
 from kemba.trajectory import Trajectory
 
 
@@ -141,7 +142,7 @@ def _rise(
     low, high = (_crossing(time, level, share) for share in (LOW, HIGH))
     dead = low - (high - low) * LOW / (HIGH - LOW)
     return {
-        "supply": log.meta.get("supply", NOMINAL),
+        "supply": log.meta.get("supply", NOMINAL_SUPPLY),
         "chamber": chamber,
         "time": time,
         "level": level,
@@ -238,7 +239,7 @@ def find_stroke(log: Trajectory) -> Stroke | None:
     if used.sum() < FEWEST:
         return None
     mode = MODES[modes.pop()]
-    supply = 0.0 if mode == "none" else log.meta.get("supply", NOMINAL)
+    supply = 0.0 if mode == "none" else log.meta.get("supply", NOMINAL_SUPPLY)
     return Stroke(mode, supply, float(v[used].mean()), float(log["piston/F"][used].mean()))
 
 
@@ -376,7 +377,7 @@ def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:
 
 def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Trajectory:
     """What a `cylinder` with `effects` answers to the motion and the valves of a bench log."""
-    supply = log.meta.get("supply", NOMINAL)
+    supply = log.meta.get("supply", NOMINAL_SUPPLY)
     model = Model(rig_mechanism(cylinder), effects, supply, "bench")
     valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.model.model import NOMINAL_SUPPLY
 from kemba.quantity import to_si
 from kemba.trajectory import Trajectory
 
-NOMINAL = 0.7e6  # Pa
 APART = 0.02  # share by which the pressures of two supplies differ at least
 SETTLED = 0.9  # quantile of an open chamber's pressure: it fills, and falls while the rod is fast
 VALVES = ("extend", "retract")
@@ -23,7 +23,7 @@ def tell_supplies(logs: Mapping[str, Trajectory], supplies: Sequence[float]) -> 
         if "supply" not in log.meta and any(np.any(log[f"valve/{v}"] > 0.5) for v in VALVES):
             untold.append((_level(log), name))
         try:
-            log.meta["supply"] = to_si(log.meta.get("supply", NOMINAL), "Pa")
+            log.meta["supply"] = to_si(log.meta.get("supply", NOMINAL_SUPPLY), "Pa")
         except ValueError as error:
             raise KembaError(f"{name}: supply", str(error)) from None
     untold.sort()
@@ -38,12 +38,13 @@ def tell_supplies(logs: Mapping[str, Trajectory], supplies: Sequence[float]) -> 
         what = f"{len(untold)} logs do not tell their supply" + (f"; {seen}" if seen else "")
         hint = f"--supply for each of {len(groups)}, or `supply: 0.6 MPa` in NAME.meta.yaml"
         raise KembaError(groups[0][0][1] if groups else "supply", what, hint=hint)
-    for supply, group in zip(sorted(supplies) or [NOMINAL], groups, strict=False):
+    for supply, group in zip(sorted(supplies) or [NOMINAL_SUPPLY], groups, strict=False):
         for _, name in group:
             logs[name].meta["supply"] = supply
     if supplies or not groups:
         return ()
-    said = f"no sidecar tells the supply of {len(untold)} logs: taken as {NOMINAL / 1e6:g} MPa"
+    taken = f"{NOMINAL_SUPPLY / 1e6:g} MPa"
+    said = f"no sidecar tells the supply of {len(untold)} logs: taken as {taken}"
     return (f"{said}, {seen or 'no pressure is logged'}; --supply tells it",)
 
 

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from kemba.effects import Effect
 from kemba.errors import KembaError
+from kemba.model.model import NOMINAL_SUPPLY
 from kemba.plant.characterise import (
     Rise,
     Stroke,
@@ -21,7 +22,6 @@ from kemba.plant.characterise import (
     stroke_table,
 )
 from kemba.plant.rigs import bench_model
-from kemba.plant.supplies import NOMINAL
 from kemba.plotting.motion import LOOKS, PANELS, plot_force_velocity
 from kemba.plotting.source import PLAN_FILE, Source
 from kemba.plotting.style import (
@@ -157,7 +157,7 @@ def plot_rig(
 
     Raises KembaError when the logs are none of these.
     """
-    cylinder = bench_model(model, NOMINAL).mechanism.need_cylinder()
+    cylinder = bench_model(model, NOMINAL_SUPPLY).mechanism.need_cylinder()
     rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
     strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
     if rises and strokes:
@@ -169,7 +169,7 @@ def plot_rig(
     if strokes:
         return plot_strokes(strokes, figure)
     name, log = _nominal(logs)
-    supply = float(log.meta.get("supply", NOMINAL))
+    supply = float(log.meta.get("supply", NOMINAL_SUPPLY))
     listed = bench_model(model, supply).effects if effects is None else tuple(effects)
     return plot_prediction(log, predict(cylinder, listed, log), name, figure)
 
@@ -177,7 +177,7 @@ def plot_rig(
 def plot_strokes(strokes: Sequence[Stroke], figure: Figure | None = None) -> Figure:
     """Force over speed by valve mode with straight fits (Fig. 6), at the nominal supply."""
     supplies = {s.supply for s in strokes if s.supply > 0.0} or {0.0}
-    supply = min(supplies, key=lambda p: abs(p - NOMINAL))
+    supply = min(supplies, key=lambda p: abs(p - NOMINAL_SUPPLY))
     shown = [s for s in strokes if s.supply in (supply, 0.0)]
     modes = [mode for mode in LOOKS if any(s.mode == mode for s in shown)]
     points = {
@@ -219,5 +219,8 @@ def _nominal(logs: Logs) -> tuple[str, Trajectory]:
     if not moving:
         expected = "logs as kemba-opt simulate writes them for a rig were expected"
         raise KembaError(next(iter(logs), "bench"), "shows no test of a known rig", expected)
-    return min(moving.items(), key=lambda item: abs(float(item[1].meta.get("supply", NOMINAL))
-                                                    - NOMINAL))  # fmt: skip
+
+    def off(item: tuple[str, Trajectory]) -> float:
+        return abs(float(item[1].meta.get("supply", NOMINAL_SUPPLY)) - NOMINAL_SUPPLY)
+
+    return min(moving.items(), key=off)

@@ -152,7 +152,7 @@ def of_logs(
 
 def _where(found: Comparison) -> str:
     """The condition that stands out most, where any does."""
-    bad = max((c for c in found.bins if c.significant), key=lambda c: c.ratio, default=None)
+    bad = found.worst
     return f"; worst: {place_of(bad)} ({short(bad.ratio)} times)" if bad else ""
 
 

@@ -18,6 +18,7 @@ from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
 from kemba.logs import load_map
 from kemba.model import Model, load_spec
+from kemba.model.model import NOMINAL_SUPPLY
 from kemba.ocp import Task, load_task, task_model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
@@ -40,7 +41,6 @@ from kemba.solve import Approach, Listener
 from kemba.solve.earlier import origin_of
 from kemba.trajectory import Array, Trajectory
 
-SUPPLY = 0.7e6  # Pa, of a model that names none
 ENTRY = "learn"  # of the manifest of a run that `learn` made
 
 
@@ -158,7 +158,7 @@ def _differs(table: Trajectory, log: Trajectory, time: Array) -> float:
 def as_executed(model: str, task: Task, path: Path) -> str:
     """A model with the supply and payload of a task, written to `path` where it needs them."""
     spec = load_spec(model)
-    if not task.payload and task.supply in (None, spec.supply or SUPPLY):
+    if not task.payload and task.supply in (None, spec.supply or NOMINAL_SUPPLY):
         return model
     extra = [{"kind": "payload", "m": task.payload}] if task.payload else []
     data = {"name": f"{spec.name}_of_the_run", "base": reference(model), "effects": extra}

@@ -67,6 +67,12 @@ class Comparison:
         return self.noise_ratio <= good and not any(c.significant for c in self.bins)
 
     @property
+    def worst(self) -> ConditionBin | None:
+        """The condition that stands out most, None where none does."""
+        clear = (c for c in self.bins if c.significant)
+        return max(clear, key=lambda c: c.ratio, default=None)
+
+    @property
     def grade(self) -> str:
         """How far the model goes, where it is not good."""
         return "nearly explains" if self.noise_ratio < FAIR else "does not explain"
@@ -183,14 +189,14 @@ def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
 def phrase(found: Comparison) -> str:
     """The answer in plain words."""
     ratio = f"{short(found.noise_ratio)} times the noise"
-    bad = sorted((c for c in found.bins if c.significant), key=lambda c: -c.ratio)
     if found.good:
         return f"The model explains the logs to within the noise: its error is {ratio}."
-    if not bad:
+    bad = found.worst
+    if bad is None:
         return f"The model's error is {ratio}; no single condition stands out."
-    worst = f"most clearly seen in {place_of(bad[0])}"
-    if bad[0].ratio >= found.noise_ratio:  # two figures that contradict each other explain nothing
-        worst = f"worst: {place_of(bad[0])} ({short(bad[0].ratio)} times)"
+    worst = f"most clearly seen in {place_of(bad)}"
+    if bad.ratio >= found.noise_ratio:  # two figures that contradict each other explain nothing
+        worst = f"worst: {place_of(bad)} ({short(bad.ratio)} times)"
     if found.tolerable:
         return (
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "

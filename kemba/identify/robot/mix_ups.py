@@ -48,7 +48,7 @@ LARGE, BY_EYE = 3.0, 10.0
 GRID, FINE = 9, 2e-3  # zeros that are tried first; share of its reach to which one is found
 SAME = 1.02  # the same by what the model leaves: thousands of rows tell so much
 QUARTER = np.pi / 2  # turns by which hips are mounted wrongly [rad]
-REACH = {"hip/q": QUARTER / 2, "piston/x": 0.02, "body/pitch": 0.4}  # of a zero, from its start
+REACH = {"hip/q": QUARTER / 2, "body/pitch": 0.4}  # of a zero, from its start [rad]
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
             yield _zero(text, hips, -1.0, -start)
         text = f"piston/x of {whose} counts from the extended end"
         yield _each(text, pistons, lambda x: stroke - x)
-        yield _zero(f"piston/x of {whose} counts from another zero", pistons)
+        yield _zero(f"piston/x of {whose} counts from another zero", pistons, reach=stroke / 4)
     if len(legs) == 2:
         columns = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
         pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in columns]
@@ -240,9 +240,16 @@ def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixU
     return MixUp(text, frozenset(names), lambda y: {n: change(y[n]) for n in names if n in y})
 
 
-def _zero(text: str, names: Sequence[str], sign: float = 1.0, start: float = 0.0) -> MixUp:
+def _zero(
+    text: str,
+    names: Sequence[str],
+    sign: float = 1.0,
+    start: float = 0.0,
+    reach: float | None = None,
+) -> MixUp:
     """A zero (and a sign): what is true is sign * reading - zero."""
-    reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
+    if reach is None:
+        reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
     bias = SensorBias(channel=names[0])
     least = (BY_EYE if bias.unit == "rad" else LARGE) * bias.parameters()["b"].size
 
