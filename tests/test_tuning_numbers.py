@@ -87,7 +87,6 @@ CONSTANTS = {  # file -> names, why
     "ocp/task/requirement.py": ("SCALES ROUND", "units; rounding"),
     "contract/cases.py": ("OWN_RIGS", "figures of example rigs"),
     # tuning numbers that are to become settings
-    "rounds/round.py": ("SUPPLY", "of a model that names none"),
     "identify/robot/physics.py": ("FOLDED", "how far a knee folds at most"),
     "identify/rigs/rig_log.py": ("GAIN", "a Gaussian's cut"),
     "events.py": ("PLANNED", "what the solver's tolerance leaves of a closed gap"),
