@@ -1,24 +1,28 @@
 """Do the tests notice bugs that nobody chose? One-line changes at random places of the new code.
 
     python benchmarks/random_mutants.py --draw 120 --seed 57  # a new list, none of it tried
+    python benchmarks/random_mutants.py --cover               # which test runs which line, once
     python benchmarks/random_mutants.py                       # try those that were not tried yet
     python benchmarks/random_mutants.py --again               # the survivors, with today's tests
 
 The list with its outcomes is benchmarks/random_mutants.jsonl; it is kept after every bug, so that
 an interrupted study goes on. Survivors that change no behaviour stand, by hand, in
-benchmarks/random_mutants.yaml. A bug is run against the quick tests of the folder that mirrors its
-file's, and those that import its module. Needs the test dependencies: pip install '.[test]'.
+benchmarks/random_mutants.yaml. A bug is run against all quick tests that run its line, quickest
+first. Needs the test dependencies and pytest-cov: pip install '.[test]' pytest-cov.
 """
 
 import argparse
 import ast
 import json
+import os
 import random
-import re
+import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from mutants import ROOT, Copy, Mutant  # beside this script
 from mutations import Change, Places
@@ -26,9 +30,8 @@ from mutations import Change, Places
 LIST = Path(__file__).with_suffix(".jsonl")
 CODE = """kemba/ocp/task kemba/ocp/reading.py kemba/ocp/refinement kemba/scene kemba/solve
 kemba/identify/infer kemba/logs""".split()
-LONGEST = 300.0  # s; see mutants.LONGEST
-MIRRORED = 20  # test files at most in the folder that mirrors a file's
-SECONDS = Path(tempfile.gettempdir()) / "kemba-seconds-of-tests.json"
+FOLDER = Path(tempfile.gettempdir())
+LINES, SECONDS = FOLDER / "kemba-lines-of-tests.db", FOLDER / "kemba-seconds-of-tests.xml"
 
 
 def kinds() -> dict[str, list[str]]:
@@ -74,64 +77,81 @@ def record(file: str, text: str, change: Change) -> dict[str, Any] | None:
     return {"file": file, "line": number, "operator": operator, "was": was, "now": now}
 
 
-def tests(file: str) -> list[str]:
-    """Test files of the mirrored folder, where it is no larger one's, and importers of the file."""
-    module, stem, home = file[:-3].replace("/", "."), Path(file).stem, Path(file).parent
-    above = module.rpartition(".")[0]
-    named = rf"{re.escape(module)}\b|from {re.escape(above)} import (\([^)]*|[^\n]*)\b{stem}\b"
-    while not (near := list((ROOT / "tests" / home.relative_to("kemba")).glob("test_*.py"))):
-        home = home.parent
-    return [
-        path.relative_to(ROOT).as_posix()
-        for path in sorted((ROOT / "tests").rglob("test_*.py"))
-        if not re.search(r"^pytestmark.*(slow|nightly)", text := path.read_text("utf-8"), re.M)
-        and (re.search(named, text) or (path in near and len(near) <= MIRRORED))
-    ]
+def cover() -> None:
+    """Run the quick tests once; keep which lines of the code each of them runs, and how long."""
+    measured = [f"--cov={code.removesuffix('.py')}" for code in CODE]
+    how = ["--cov-context=test", "--cov-report=", "-o", "junit_family=xunit1"]
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider"]
+    setting = {**os.environ, "COVERAGE_FILE": str(LINES)}
+    subprocess.run([*command, *measured, *how, f"--junitxml={SECONDS}"], cwd=ROOT, env=setting)
 
 
-def seconds(copy: Copy, files: list[str]) -> dict[str, float]:
-    """How long test files take without a bug, by a file of the computer's; what fails without one,
-    as a test of links to files that are not copied, is left out and told."""
-    known = json.loads(SECONDS.read_text("utf-8")) if SECONDS.is_file() else {}
-    for file in files:
-        if file not in known:
-            begin = time.monotonic()
-            if failed := copy.failing([file]):
-                print(f"left out, fails without any bug: {failed}", flush=True)
-            known[file] = None if failed else time.monotonic() - begin
-            SECONDS.write_text(json.dumps(known), "utf-8")
-    return {file: known[file] for file in files if known[file] is not None}
+class Covering:
+    """Which tests run a line."""
+
+    def __init__(self) -> None:
+        from coverage import CoverageData  # of pytest-cov, which only this study needs
+
+        self.data = CoverageData(str(LINES))
+        self.data.read()
+        cases = ElementTree.parse(SECONDS).iter("testcase")
+        sound = (case for case in cases if case.find("failure") is None)
+        self.seconds = {f"{c.get('file')}::{c.get('name')}": float(c.get("time")) for c in sound}
+
+    def tests(self, bug: dict[str, Any]) -> dict[str, float]:
+        """Seconds of the tests that run a bug's line, quickest first; where it is run only when
+        its module is loaded, of those that run anything of the module."""
+        lines = self.data.contexts_by_lineno(str(ROOT / bug["file"]))
+        own = {context.partition("|")[0] for context in lines.get(bug["line"], ())} - {""}
+        every = {context.partition("|")[0] for found in lines.values() for context in found}
+        found = {name: self.seconds[name] for name in own or every if name in self.seconds}
+        return dict(sorted(found.items(), key=lambda pair: pair[1]))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--draw", type=int, default=0, help="make a new list of so many")
     parser.add_argument("--seed", type=int, default=57)
+    parser.add_argument("--cover", action="store_true", help="which test runs which line")
     parser.add_argument("--again", action="store_true", help="try those that survived once more")
     parser.add_argument("--only", default="", help="those whose file contains this")
     arguments = parser.parse_args()
     if arguments.draw:
         keep(drawn(arguments.draw, arguments.seed))
+    elif arguments.cover:
+        cover()
     else:
         study("again" if arguments.again else "outcome", arguments.only)
 
 
 def study(key: str, only: str) -> None:
     """Run what was not tried, or what survived, and keep each outcome under the key."""
-    bugs = listed()
+    bugs, covering = listed(), Covering()
     with tempfile.TemporaryDirectory() as folder:
-        copy = Copy(Path(folder), LONGEST)
+        copy = Copy(Path(folder))
         for bug in (bug for bug in bugs if only in bug["file"]):
             if bug.get("outcome") == (None if key == "outcome" else "survived"):
-                cost = seconds(copy, tests(bug["file"]))
-                order = tuple(sorted(cost, key=cost.__getitem__))
-                mutant = Mutant(bug["file"], bug["operator"], bug["was"], bug["now"], order)
-                begin, text = time.monotonic(), mutant.mutated(copy.root)
-                by = copy.noticed_by(mutant, text) if text else "does not apply"
+                begin = time.monotonic()
+                by = noticed_by(bug, covering.tests(bug), copy)
                 bug |= {key: "killed" if by else "survived", "by": by or ""}
                 bug["seconds"] = round(time.monotonic() - begin, 1)
                 keep(bugs)
                 print(bug[key], bug["seconds"], f"{bug['file']}:{bug['line']}", by, flush=True)
+
+
+def noticed_by(bug: dict[str, Any], cost: dict[str, float], copy: Copy) -> str | None:
+    """The first of the tests that fails on a bug, and only on it; None where all pass."""
+    while True:
+        mutant = Mutant(bug["file"], bug["operator"], bug["was"], bug["now"], tuple(cost))
+        # a run without end is noticed; without the cache, plans of tests are made anew
+        copy.longest = 300.0 + 5.0 * sum(cost.values())
+        if (text := mutant.mutated(copy.root)) is None:
+            raise SystemExit(f"{bug['file']} has changed: draw anew (--draw)")
+        by = copy.noticed_by(mutant, text) if cost else None
+        if by not in cost or not copy.failing([by]):
+            return by
+        print(f"left out, fails without any bug: {by}", flush=True)
+        del cost[by]
 
 
 def listed() -> list[dict[str, Any]]:

@@ -92,8 +92,14 @@ def clear(found: Plan) -> Plan:
     touches = grazes(found.trajectory, euler=not found.refined)
     if not touches:
         return found
-    what = f"`clearance` is not kept: {touches[0].sentence}"
+    what = not_clear(found.task, touches[0])
     return replace(found, status=Status.ACCEPTABLE, sentence=f"{what}; {found.sentence}")
+
+
+def not_clear(task: Task, graze: Graze) -> str:
+    """That a foot touches the ground where the task asks it to be clear of it, in words."""
+    line = f" ({place})" if (place := task.place("clearance")) else ""
+    return f"`clearance`{line}: {task.clearance:g} m is asked, but {graze.sentence}"
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from kemba.mechanism.knee import felt
 from kemba.model import Model, load_model
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
-from kemba.ocp.planned import grazes
+from kemba.ocp.planned import grazes, not_clear
 from kemba.ocp.task.requirement import Requirement, apex_node
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.templates import longest_leg
@@ -157,6 +157,14 @@ def test_grazes_are_short_contacts_in_flight() -> None:
     )
     assert not grazes(flight((0.0, 0.01), (0.04, 0.07), (0.09, 0.1)))
     assert not grazes(flight((0.0, 0.01), (0.095, 0.1)))
+
+
+def test_a_graze_is_told_with_its_line() -> None:
+    task, _ = load_task("jump.yaml", ["clearance=3 cm"])
+    (graze,) = grazes(flight((0.0, 0.01), (0.04, 0.044), (0.08, 0.1)))
+    assert not_clear(task, graze) == (
+        f"`clearance` (--set clearance): 0.03 m is asked, but {graze.sentence}"
+    )
 
 
 def test_an_implicit_euler_contact_begins_with_its_step() -> None:

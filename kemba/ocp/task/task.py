@@ -322,7 +322,7 @@ def _last_height(document: Document) -> Document:
 
 
 # keys that ask something of a motion by themselves
-PLACED = ("duration", "min_dwell", "landing.impact_speed", "grip", "contacts")
+PLACED = ("duration", "min_dwell", "landing.impact_speed", "grip", "contacts", "clearance")
 # keys of earlier versions: what an old file is told
 RETIRED = {
     ("fit_air",): "plans are no longer bent to the simulated robot; learn from logs instead, or "
