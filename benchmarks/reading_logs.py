@@ -1,10 +1,11 @@
 """How long a long log takes to read, and what it needs, beside its format's own library.
 
-python benchmarks/reading_logs.py [--minutes 10] [--formats csv mf4 ...] [--repeats 3]
+python benchmarks/reading_logs.py [--minutes 10] [--formats csv mf4 ...] [--repeats 3] [--write]
 
 One log of 40 channels at 1 kHz is written in each format. A process of its own reads it into arrays
 by the format's library, another one by kemba; the least CPU time of several repeats, and by how
-much the process grew at most, are printed as a table. Linux only: it tells the largest size.
+much the process grew at most, are printed as a table, with `--write` into the page of benchmarks.
+Linux only: it tells the largest size.
 """
 
 import argparse
@@ -12,12 +13,17 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from block import printed, put_block
 
+from kemba.sweep import machine
+
+PAGE = Path(__file__).parent / "pages" / "benchmarks.md"
+MARKS = "<!-- reading: written by benchmarks/reading_logs.py -->", "<!-- end of reading -->"
 CHANNELS, RATE = 40, 1000
 Table = dict[str, np.ndarray]
 
@@ -193,26 +199,34 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--formats", nargs="+", choices=WRITERS, default=list(WRITERS))
     parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--write", action="store_true", help="put the table into the page")
     asked = parser.parse_args()
-    log = table(asked.minutes)
+    lines = printed(rows(asked.minutes, asked.formats, asked.repeats))
+    if asked.write:
+        how = f"The least of {asked.repeats} times each, on {machine()}."
+        put_block(PAGE, *MARKS, [*lines, "", how])
+
+
+def rows(minutes: float, formats: list[str], repeats: int) -> Iterator[str]:
+    """Lines of the table, one format after the other."""
+    log = table(minutes)
     arrays = sum(values.nbytes for values in log.values())
-    print(
-        f"{asked.minutes:g} min, {CHANNELS} channels at {RATE} Hz: arrays of {arrays / 1e6:.0f} MB"
-    )
-    print("| format | library, s CPU | kemba, s CPU | times | library, MB | kemba, MB | arrays |")
-    print("|---|---|---|---|---|---|---|")
+    size = f"arrays of {arrays / 1e6:.0f} MB"
+    yield f"{minutes:g} min, {CHANNELS} channels at {RATE} Hz: {size}"
+    yield ""
+    yield "| format | library, s CPU | kemba, s CPU | times | library, MB | kemba, MB | arrays |"
+    yield "|---|---:|---:|---:|---:|---:|---:|"
     with tempfile.TemporaryDirectory() as folder:
-        for ending in asked.formats:
+        for ending in formats:
             path = Path(folder) / ("log_bag" if ending == "bag" else f"log.{ending}")
             WRITERS[ending](log, path)
             load, read = LIBRARIES[ending]
-            theirs = measured(path, load, read, asked.repeats)
+            theirs = measured(path, load, read, repeats)
             load, read = KEMBA
-            ours = measured(path, load.format(binary=ending != "csv"), read, asked.repeats)
-            print(
+            ours = measured(path, load.format(binary=ending != "csv"), read, repeats)
+            yield (
                 f"| {ending} | {theirs[0]:.2f} | {ours[0]:.2f} | {ours[0] / theirs[0]:.2f} | "
-                f"{theirs[1] / 1e6:.0f} | {ours[1] / 1e6:.0f} | {ours[1] / arrays:.2f} |",
-                flush=True,
+                f"{theirs[1] / 1e6:.0f} | {ours[1] / 1e6:.0f} | {ours[1] / arrays:.2f} |"
             )
             if path.is_file():
                 path.unlink()
