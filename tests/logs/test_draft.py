@@ -4,6 +4,7 @@ from pathlib import Path
 
 import foreign_files
 import numpy as np
+import pandas as pd
 import pytest
 from typer.testing import CliRunner, Result
 
@@ -123,6 +124,21 @@ def test_our_own_names_need_no_guess(tmp_path: Path) -> None:
     draft = draft_map(tmp_path / "log.csv", LEGS)
     assert set(draft.columns) == {"time [s]", *log.headers}
     assert all(source["source"] == header for header, source in draft.columns.items())
+
+
+@pytest.mark.parametrize("ends", [("a", "b"), ("1", "2")])
+def test_two_alike_are_asked_about(ends: tuple[str, str], tmp_path: Path) -> None:
+    """A letter or a number makes neither the better one, though `b` may be a back leg and `a` an
+    acceleration."""
+    log = foreign_files.robot_log()
+    table = {"time [s]": log.time, **{n.replace("/", "_"): v for n, v in log.columns.items()}}
+    place = table.pop("body_x [m]")
+    for factor, end in enumerate(ends, start=1):
+        table[f"body_x_{end} [m]"] = factor * place
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", LEGS, 0.07)
+    one, other = (f"'body_x_{end} [m]'" for end in ends)
+    assert draft.questions == (f"body/x [m] may be {one} or {other}",)
 
 
 def test_what_is_no_table_is_told(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.logs.draft.words import Meaning, Names, unknown, without_sensors
+from kemba.logs.draft.words import Meaning, Names, unknown, without_sensors, words
 from kemba.quantity import convert
 from kemba.trajectory import Array
 
@@ -202,6 +202,10 @@ def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target
                 if NOTHING < score < other + UNRELATED:  # what is left says as much
                     score = other
                 scores[i, j] = score - STRANGER * strangers if score > NOTHING else NOTHING
+    for i, target in enumerate(targets):
+        if not {"leg", "side"} & {*target.means, *target.may}:
+            for alike in _siblings(names, columns):  # a letter or a number makes none the better one
+                scores[i, alike] = scores[i, alike].max()
     scores[scores < ENOUGH] = NOTHING
     total, best = _best(scores)
     pairs: dict[str, str] = {}
@@ -242,6 +246,16 @@ def fits(target: Target, unit: str | None, values: Array) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _siblings(names: Names, columns: Sequence[str]) -> list[list[int]]:
+    """Columns of one unit that only a last letter or number tells apart: `x_a [m]`, `x_b [m]`."""
+    found: dict[tuple[str, ...], list[int]] = {}
+    for j, name in enumerate(columns):
+        *stem, last = words(names.bare(name)) or [""]
+        if len(last) == 1 and last not in "xyz" and stem:
+            found.setdefault((*stem, names.unit(name) or ""), []).append(j)
+    return [alike for alike in found.values() if len(alike) > 1]
 
 
 def by_unit(says: Meaning, target: Target, unit: str | None) -> Meaning:
