@@ -1,6 +1,6 @@
 """A policy's file: everything that its player needs, as arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +11,6 @@ from kemba.errors import KembaError
 from kemba.events import PLANNED, read
 from kemba.model import Model
 from kemba.plant.controller import PERIOD, Gains, hip_control, read_controller
-from kemba.plant.repeat import Sensors
 from kemba.plant.retiming import edges_of
 from kemba.policy.course import course_of
 from kemba.policy.modes import (
@@ -19,7 +18,6 @@ from kemba.policy.modes import (
     BLIND,
     EDGE,
     FADING,
-    FEWEST,
     JOINT,
     JOINT_RATE,
     LATEST,
@@ -139,96 +137,22 @@ def _when_sent(
     return k
 
 
-@dataclass(frozen=True)
-class Expected:
-    """The mean (rows, k) of what is measured, and the slopes (rows, n, 2 k) by which the deviation
-    of the state x follows from measured deviations and their rates.
-
-    The slopes are the best linear estimate: what sensors add by noise, and what is usual in
-    executions, are weighed against each other. So noise alone moves nothing, and chambers that are
-    not measured are inferred from what is.
-    """
-
-    mean: Array
-    estimate: Array
-
-
-def expected_from(
-    executions: Sequence[Trajectory],
-    clock: Array,
-    measured: Sequence[str],
-    states: Sequence[str],
-    noise: Mapping[str, float],
-) -> Expected:
-    """What `executions` of a table under various conditions do at the times `clock` (rows,) [s].
-
-    `noise`: 1 sigma by the ending of a measured column, in its unit.
-    """
-    y = np.array([_columns(motion, clock, measured) for motion in executions])
-    x = np.array([_columns(motion, clock, states) for motion in executions])
-    mean = y.mean(axis=0)
-    y, x = y - mean, x - x.mean(axis=0)
-    both = np.concatenate([y, _rates(y, clock)], axis=2)
-    count = len(executions)
-    sigma = np.array([noise.get(name.split("/")[-1], 0.0) for name in measured])
-    added = _noise(sigma, float(np.median(np.diff(clock))))
-    across = np.einsum("erx,ery->rxy", x, both) / count
-    own = np.einsum("erx,ery->rxy", both, both) / count + added
-    return Expected(mean, across @ np.linalg.pinv(own, hermitian=True))
-
-
-def _columns(motion: Trajectory, clock: Array, names: Sequence[str]) -> Array:
-    """Columns (rows, k) at the times of a clock; zero where the motion has no such column."""
-    found = np.zeros((len(clock), len(names)))
-    for k, name in enumerate(names):
-        if name in motion:
-            found[:, k] = np.interp(clock, motion.time, motion[name])
-    return found
-
-
-def _rates(y: Array, clock: Array) -> Array:
-    """Rates (executions, rows, k) as the player has them: by a line through the last ticks."""
-    period = float(np.median(np.diff(clock)))
-    found = np.zeros_like(y)
-    for row in range(2, y.shape[1]):
-        first = max(0, row - WINDOW + 1)
-        weights = _line(row - first + 1, period)
-        found[:, row] = np.einsum("t,etk->ek", weights, y[:, first : row + 1])
-    return found
-
-
-def _line(count: int, period: float) -> Array:
-    """Weights (count,) [s-1] by which successive values give the slope of a line through them."""
-    time = (np.arange(count) - (count - 1) / 2) * period
-    return np.asarray(time / (time @ time))
-
-
-def _noise(sigma: Array, period: float) -> Array:
-    """Covariance (2 k, 2 k) of the noise of values and their rates."""
-    weights = _line(WINDOW, period)
-    values = np.diag(sigma**2)
-    between, rates = values * weights[-1], values * (weights @ weights)
-    return np.block([[values, between], [between, rates]])
-
-
 FILE = "policy.npz"
 
 
-def write_policy(
-    model: Model, table: Trajectory, path: str | Path, executions: Sequence[Trajectory] = ()
-) -> Path:
-    """The policy around an executed controller table, written to `path`.
+def write_policy(model: Model, table: Trajectory, path: str | Path) -> Path:
+    """The policy around a controller table, written to `path`; deviations are counted from the
+    table's execution on `model`.
 
-    `executions` of the table under various conditions tell what deviations are expected and what
-    the sensors say of them; without any, deviations are counted from the table on `model`. Raises
-    KembaError where the table cannot be simulated, or the model has contacts that are not rigid.
+    Raises KembaError where the table cannot be simulated, or the model has contacts that are not
+    rigid.
     """
     try:
         course = course_of(model, table)
     except ValueError as error:
         what = f"a feedback policy needs rigid contacts, but the model {error}"
         raise KembaError(model.name, what) from None
-    arrays = policy_arrays(course, executions)
+    arrays = policy_arrays(course)
     with Path(path).open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
     return Path(path)
@@ -240,13 +164,8 @@ def measured(model: Model) -> list[str]:
     return [f"{n.split('/')[0]}/piston/x" if n.endswith("/knee/q") else n for n in names]
 
 
-def policy_arrays(
-    course: EventCourse, executions: Sequence[Trajectory] = (), also: Sequence[str] = ()
-) -> dict[str, Array]:
-    """The arrays of a policy by name, as docs/policy.md lists them.
-
-    `also`: columns of the executions that are measured as well, such as pressures.
-    """
+def policy_arrays(course: EventCourse) -> dict[str, Array]:
+    """The arrays of a policy by name, as docs/policy.md lists them."""
     model = course.hybrid.model
     table, motion = read_controller(course.table), course.motion
     ticks, first = len(table), round(table.time[0] / PERIOD)
@@ -255,12 +174,6 @@ def policy_arrays(
     names = measured(model)
     reference = np.column_stack([motion[n] for n in names])[rows]
     to_x = _to_state(course)[rows]
-    if len(executions) >= FEWEST:
-        clock = (first + np.arange(ticks)) * PERIOD
-        noise = Sensors.usual().noise
-        names = [*names, *also]
-        found = expected_from(executions, clock, names, [q.name for q in model.state], noise)
-        reference, to_x = found.mean, found.estimate
     landing = _landing(course)
     gains = gains_of(course, landing)
     hips = np.zeros((ticks, len(course.joints), 2 * len(names)))

@@ -12,12 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.events import UPRIGHT, turned
 from kemba.files import atomic_path
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
 from kemba.plant.certificate import rest_after
-from kemba.plant.controller import execute_many, read_controller
 from kemba.plant.repeat import VALVE_SCATTER, plant_of
 from kemba.policy.execute import execute_policy
 from kemba.policy.player import Policy
@@ -26,26 +24,8 @@ from kemba.runs import Run, load_run
 from kemba.scenarios.draw import Scenario, scenarios, standing
 from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
-from kemba.trajectory import Trajectory
 
 UNCERTAINTIES = "twice"  # of configs/uncertainties
-COUNT = 64  # scenarios from which feedback learns what to expect
-
-
-def executions_of(run: str | Path) -> list[Trajectory]:
-    """The table of a run executed open loop on its task's plant under drawn uncertainties.
-
-    Those that cannot be simulated or do not end as upright as the plan are left out. Raises
-    KembaError where the run has no table or no plan.
-    """
-    table, plant = read_controller(run), plant_of(run)
-    cases = scenarios(UNCERTAINTIES, plant, COUNT)
-    asked = [{"model": c.model, "start": standing(c.model, table, c.start)} for c in cases]
-    pitch = float(load_run(run).trajectory["body/pitch"][-1])
-    done = [d for d in execute_many(table, asked) if not isinstance(d, KembaError)]
-    return [d.trajectory for d in done if turned(d.trajectory["body/pitch"][-1], pitch) <= UPRIGHT]
-
-
 KEPT = ("tried", "succeeded", "ended", "of")  # arrays of the file
 WAYS = {  # which parts act: retimed edges, torques of the hips
     "edges and hips": (True, True),
@@ -74,8 +54,7 @@ def policy_of(run: str | Path, tell: Tell = silent) -> Path:
     if not file.is_file() or file.stat().st_mtime < made:
         model = task_model(load_task(own.task)[0])
         with atomic_path(file) as path:
-            tell("executing under uncertainty")
-            write_policy(model, own.controller, path, executions_of(own.path))
+            write_policy(model, own.controller, path)
             _choose(own, model, path, tell)
     return file
 

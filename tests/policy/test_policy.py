@@ -11,13 +11,12 @@ from typer.testing import CliRunner
 from kemba.model import Model, load_model
 from kemba.plant.commands import Profile
 from kemba.plant.controller import execute
-from kemba.plant.repeat import Sensors
 from kemba.policy import player
 from kemba.policy.course import course_of
 from kemba.policy.execute import execute_policy
 from kemba.policy.modes import Edge, EventCourse, Saltation
 from kemba.policy.player import Policy
-from kemba.policy.write import gains_of, measured, policy_arrays, write_policy
+from kemba.policy.write import gains_of, policy_arrays, write_policy
 from kemba.trajectory import Trajectory
 from kemba_cli.main import app
 
@@ -146,26 +145,6 @@ def test_corrections_are_bounded(course: EventCourse, tmp_path: Path) -> None:
     assert np.abs(gap).max() <= most + 1e-9
     when = [int(np.argmax([policy.step(far, rates)[1][0] for _ in range(30)]))]
     assert abs(when[0] + 1 - 10) <= int(arrays["most_shift"])
-
-
-def test_what_is_expected_keeps_noise_from_the_valves(
-    model: Model, table: Trajectory, course: EventCourse
-) -> None:
-    """Before anything differs between executions, sensors can say nothing; deviations are counted
-    from the mean of the executions."""
-    pitches = np.random.default_rng(2).normal(0.06, 0.02, 24)
-    done = [execute(table, model, start={"body/pitch": pitch}).trajectory for pitch in pitches]
-    plain, weighed = policy_arrays(course), policy_arrays(course, done)
-    mean = np.mean([motion["body/pitch"][:TICKS] for motion in done], axis=0)
-    k = [str(name) for name in weighed["measured"]].index("body/pitch")
-    assert weighed["reference"][:, k] == pytest.approx(mean, abs=1e-9)
-    sigma = np.array([Sensors.usual().noise.get(n.split("/")[-1], 0.0) for n in measured(model)])
-    rates = sigma * np.sqrt(12.0 / 8**3) / 1e-3  # of a line through 8 ticks
-    noise = np.concatenate([sigma, rates])
-    moved = [np.abs(arrays["edge_gain"] * noise).max() for arrays in (plain, weighed)]
-    assert moved[1] < 0.5 * moved[0]
-    few = policy_arrays(course, done[:5])
-    assert np.array_equal(few["edge_gain"], plain["edge_gain"]), "too few tell nothing"
 
 
 def test_the_reference_player_is_short_and_needs_only_numpy() -> None:

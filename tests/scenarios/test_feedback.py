@@ -43,7 +43,6 @@ def test_the_parts_with_which_most_executions_come_out_are_kept(
     tried: int,
 ) -> None:
     (run / "policy.npz").unlink(missing_ok=True)
-    monkeypatch.setattr(feedback, "executions_of", lambda run: [])
     monkeypatch.setattr(feedback, "_tried", lambda run, model, file, way, cases: found[way])
     with changed(TrialSettings, count=4):
         file = policy_of(run)

@@ -204,7 +204,7 @@ def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target
                 scores[i, j] = score - STRANGER * strangers if score > NOTHING else NOTHING
     for i, target in enumerate(targets):
         if not {"leg", "side"} & {*target.means, *target.may}:
-            for alike in _siblings(names, columns):  # a letter or a number makes none the better one
+            for alike in _siblings(names, columns):  # a letter or number makes none the better one
                 scores[i, alike] = scores[i, alike].max()
     scores[scores < ENOUGH] = NOTHING
     total, best = _best(scores)
