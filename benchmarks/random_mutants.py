@@ -86,6 +86,11 @@ def cover() -> None:
     subprocess.run([*command, *measured, *how, f"--junitxml={SECONDS}"], cwd=ROOT, env=setting)
 
 
+def function(test: str) -> str:
+    """The function of a test, or of a context of coverage's, without parameters and phase."""
+    return test.partition("[")[0].partition("|")[0]
+
+
 class Covering:
     """Which tests run a line."""
 
@@ -94,16 +99,18 @@ class Covering:
 
         self.data = CoverageData(str(LINES))
         self.data.read()
-        cases = ElementTree.parse(SECONDS).iter("testcase")
-        sound = (case for case in cases if case.find("failure") is None)
-        self.seconds = {f"{c.get('file')}::{c.get('name')}": float(c.get("time")) for c in sound}
+        self.seconds: dict[str, float] = {}
+        for case in ElementTree.parse(SECONDS).iter("testcase"):
+            if case.find("failure") is None:
+                name = function(f"{case.get('file')}::{case.get('name')}")
+                self.seconds[name] = self.seconds.get(name, 0.0) + float(case.get("time") or 0.0)
 
     def tests(self, bug: dict[str, Any]) -> dict[str, float]:
         """Seconds of the tests that run a bug's line, quickest first; where it is run only when
         its module is loaded, of those that run anything of the module."""
         lines = self.data.contexts_by_lineno(str(ROOT / bug["file"]))
-        own = {context.partition("|")[0] for context in lines.get(bug["line"], ())} - {""}
-        every = {context.partition("|")[0] for found in lines.values() for context in found}
+        own = {function(context) for context in lines.get(bug["line"], ()) if context}
+        every = {function(context) for found in lines.values() for context in found}
         found = {name: self.seconds[name] for name in own or every if name in self.seconds}
         return dict(sorted(found.items(), key=lambda pair: pair[1]))
 
@@ -148,10 +155,10 @@ def noticed_by(bug: dict[str, Any], cost: dict[str, float], copy: Copy) -> str |
         if (text := mutant.mutated(copy.root)) is None:
             raise SystemExit(f"{bug['file']} has changed: draw anew (--draw)")
         by = copy.noticed_by(mutant, text) if cost else None
-        if by not in cost or not copy.failing([by]):
+        if by is None or (own := function(by)) not in cost or not copy.failing([own]):
             return by
         print(f"left out, fails without any bug: {by}", flush=True)
-        del cost[by]
+        del cost[own]
 
 
 def listed() -> list[dict[str, Any]]:

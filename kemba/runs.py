@@ -20,11 +20,12 @@ from kemba.trajectory import Trajectory
 
 MANIFEST = "manifest.json"
 PLANT_RUN = "plant.csv"  # the motion of the simulated robot, in the plan's clock
+POLICY = "policy.npz"  # feedback around the plan
 STAGES = "stages.npz"  # the solved program, from which `solve --from` begins
 TABLES = ("trajectory", "controller", "plant")
 REPLACED = (  # what a run consists of, and pages about it
     *("task.yaml", "certificate.json", "solver.log", "figure.png", "report.html", "view.html"),
-    STAGES,
+    *(STAGES, POLICY),
     *(f"{name}.{kind}" for name in TABLES for kind in ("csv", "meta.yaml")),
 )
 LIBRARIES = ("casadi", "pin", "numpy")

@@ -69,7 +69,8 @@ def solve(
     """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
 
     Exit code 1 when no plan is found, or when its re-simulation or the
-    simulated robot leaves it by more than the task's tolerances.
+    simulated robot leaves it by more than the task's tolerances, the
+    latter also with feedback (policy.npz).
 
     `height` is that of the body's centre: at 0.45 m the feet rise 1 cm.
     `--set "feet=8 cm"` asks for the height of the feet instead.
@@ -133,7 +134,8 @@ def solve(
     else:
         typer.echo(answer["run"])
         say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
-        say_next(after_solve(answer["run"], answer["good"], answer["status"]), quiet)
+        feedback = "feedback" in answer
+        say_next(after_solve(answer["run"], answer["good"], answer["status"], feedback), quiet)
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:

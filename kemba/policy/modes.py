@@ -296,7 +296,6 @@ PLACE, SPEED, PITCH, PITCH_RATE, JOINT, JOINT_RATE = 0.01, 0.1, 0.01, 0.03, 0.01
 # the same: torque that is added [N.m], time by which a valve edge moves [s]
 TORQUE, EDGE = 2.0, 3e-3
 FADING = 0.1  # s; stage costs of this long count as much as those at the end
-WINDOW = 8  # ticks, over which rates are estimated
 # ticks before and after touchdown in which no torque is added: feet that touch a little sooner or
 # later have quite other velocities
 BLIND = 10

@@ -8,7 +8,7 @@
 """
 
 from os import PathLike
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -18,7 +18,9 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 class Policy:
     """Hips follow the plan and correct deviations; valve edges come sooner or later."""
 
-    def __init__(self, file: str | PathLike[str], retime: bool = True, hips: bool = True) -> None:
+    def __init__(
+        self, file: str | PathLike[str] | IO[bytes], retime: bool = True, hips: bool = True
+    ) -> None:
         with np.load(file, allow_pickle=False) as data:
             self.data = {name: data[name] for name in data.files}
         d = self.data
@@ -30,48 +32,40 @@ class Policy:
         self.waiting = [
             np.flatnonzero(d["edge_valve"] == v).tolist() for v in range(len(self.valves))
         ]
-        self.past: list[Array] = []  # deviations of the last ticks
+        self.x = np.zeros(d["A"].shape[1])  # estimated deviation of the state
+        self.late: list[tuple[int, Array]] = []  # what comes of moved edges, and at which row
 
     def step(self, measured: Array, hip_rates: Array) -> tuple[Array, Array]:
         """Torques (m,) [N.m] and valves (v,) of the next tick."""
         d, row = self.data, min(self.tick, len(self.data["reference"]) - 1)
-        deviation = self._deviation(np.asarray(measured) - d["reference"][row])
+        deviation = np.asarray(measured) - d["reference"][row]
+        self.x = self.x + d["L"][row] @ (deviation - d["C"][row] @ self.x)
         wanted = d["wanted"][min(row, len(d["wanted"]) - 1)]
         angle = np.asarray(measured)[d["joint_rows"]]
         torque = d["K_p"] * (wanted[:, 0] - angle) + d["K_d"] * (wanted[:, 1] - hip_rates)
-        torque += wanted[:, 2]
+        most, added = float(d["most_torque"]), np.zeros(len(angle))
         if self.hips and self.tick < len(d["hip_gains"]):
-            most = float(d["most_torque"])
-            torque += np.clip(d["hip_gains"][row] @ deviation, -most, most)
-        self._switch(deviation)
+            added = np.clip(d["hip_gains"][row] @ self.x, -most, most)
+        self._switch()
+        self.x = d["A"][row] @ self.x + d["B"][row] @ added
+        self.x += sum(change for at, change in self.late if at == self.tick)
         self.tick += 1
-        return self._limited(torque, hip_rates), self.state.copy()
+        return self._limited(torque + wanted[:, 2] + added, hip_rates), self.state.copy()
 
-    def _deviation(self, here: Array) -> Array:
-        """Deviations and their rates, by a straight line through the last ticks."""
-        d = self.data
-        self.past = [*self.past, here][-int(d["window"]) :]
-        n = len(self.past)
-        rate = np.zeros_like(here)
-        if n > 2:
-            time = (np.arange(n) - (n - 1) / 2) * float(d["period"])
-            rate = time @ np.array(self.past) / (time @ time)
-        return np.concatenate([here, rate])
-
-    def _switch(self, deviation: Array) -> None:
+    def _switch(self) -> None:
         """Edges that are due; each moves by its gain, at most `most_shift` ticks."""
         d = self.data
         most = int(d["most_shift"])
         for v, waiting in enumerate(self.waiting):
-            while waiting:
-                k = waiting[0]
-                shift = float(d["edge_gain"][k] @ deviation) if self.retime else 0.0
-                due = int(d["edge_tick"][k]) + round(min(max(shift, -most), most))
-                if self.tick < due:
-                    break
+            if not waiting:
+                continue
+            k, tick = waiting[0], int(d["edge_tick"][waiting[0]])
+            shift = float(d["edge_gain"][k] @ self.x) if self.retime else 0.0
+            if self.tick >= tick + round(min(max(shift, -most), most)):
                 self.state[v] = d["edge_value"][k]
-                waiting.pop(0)
-                break  # two edges of a valve are a tick apart
+                acts = max(int(d["edge_acts"][k]), self.tick)
+                self.late.append((acts, (self.tick - tick) * d["edge_late"][k]))
+                waiting.pop(0)  # two edges of a valve are a tick apart
 
     def _limited(self, torque: Array, speed: Array) -> Array:
         """What the motors give: peak torque, and less the faster they turn."""

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
@@ -26,7 +25,6 @@ from kemba.policy.modes import (
     PLACE,
     SPEED,
     TORQUE,
-    WINDOW,
     Array,
     Edge,
     Event,
@@ -36,6 +34,7 @@ from kemba.policy.modes import (
     Tick,
     plain,
 )
+from kemba.policy.observer import Observer, measured, observer_of
 from kemba.trajectory import Trajectory
 
 
@@ -137,9 +136,6 @@ def _when_sent(
     return k
 
 
-FILE = "policy.npz"
-
-
 def write_policy(model: Model, table: Trajectory, path: str | Path) -> Path:
     """The policy around a controller table, written to `path`; deviations are counted from the
     table's execution on `model`.
@@ -158,12 +154,6 @@ def write_policy(model: Model, table: Trajectory, path: str | Path) -> Path:
     return Path(path)
 
 
-def measured(model: Model) -> list[str]:
-    """What a policy measures: the body's place and pitch, hips, pistons."""
-    names = [c.name for c in model.mechanism.coordinates]
-    return [f"{n.split('/')[0]}/piston/x" if n.endswith("/knee/q") else n for n in names]
-
-
 def policy_arrays(course: EventCourse) -> dict[str, Array]:
     """The arrays of a policy by name, as docs/policy.md lists them."""
     model = course.hybrid.model
@@ -173,18 +163,17 @@ def policy_arrays(course: EventCourse) -> dict[str, Array]:
     rows = np.clip(np.arange(ticks) - start, 0, len(motion) - 1)
     names = measured(model)
     reference = np.column_stack([motion[n] for n in names])[rows]
-    to_x = _to_state(course)[rows]
+    observer = observer_of(course, rows, first)
     landing = _landing(course)
     gains = gains_of(course, landing)
-    hips = np.zeros((ticks, len(course.joints), 2 * len(names)))
+    hips = np.zeros((ticks, len(course.joints), course.hybrid.size))
     for tick, K in gains.hips.items():
         if 0 <= tick - first < ticks:
-            hips[tick - first] = K @ to_x[tick - first]
+            hips[tick - first] = K
     touch = round(landing / PERIOD) - first
     near = np.abs(np.arange(ticks) - touch) <= BLIND
     hips[near] = 0.0
     by_edge = {(edge.valve, edge.index): gain for edge, gain in gains.edges}
-    edges = _edges(course, by_edge, to_x, first)
     control = hip_control(model, table, Gains())
     return {
         "period": np.array(PERIOD),
@@ -197,55 +186,37 @@ def policy_arrays(course: EventCourse) -> dict[str, Array]:
         "K_p": np.array(control.K_p),
         "K_d": np.array(control.K_d),
         "limits": control.limits,
-        "hip_gains": hips,
+        **{key: np.float32(getattr(observer, key)) for key in "ABCL"},
+        "hip_gains": np.float32(hips),
         "most_torque": np.array(ADDED),
         "most_shift": np.array(LATEST),
-        "window": np.array(WINDOW),
-        **edges,
+        **_edges(course, by_edge, observer),
     }
 
 
 def _edges(
-    course: EventCourse, gains: dict[tuple[str, int], Array], to_x: Array, first: int
+    course: EventCourse, gains: dict[tuple[str, int], Array], observer: Observer
 ) -> dict[str, Array]:
-    """Every edge of every valve in order of time, with its gain by what is measured."""
-    table = read_controller(course.table)
+    """Every edge of every valve in order of time: its gain, and what comes of its lateness."""
+    table, zero = read_controller(course.table), np.zeros(course.hybrid.size)
     valves = [name for name in table.names if "/valve/" in name]
-    listed = []
-    for v, name in enumerate(valves):
-        for k, tick in enumerate(edges_of(table)[name]):
-            gain = gains.get((name, k), np.zeros(course.hybrid.size))
-            listed.append((tick, v, float(k % 2 == 0), gain @ to_x[tick]))
-    listed.sort(key=lambda edge: edge[:2])
-    size = to_x.shape[2]
+    listed = sorted(
+        (tick, v, k)
+        for v, name in enumerate(valves)
+        for k, tick in enumerate(edges_of(table)[name])
+    )
+    keys = [(valves[v], k) for _, v, k in listed]
+    late = [observer.late.get(key, (-1, zero)) for key in keys]
+    size = (-1, len(zero))
     return {
         "valves": np.array(valves),
-        "edge_tick": np.array([e[0] for e in listed], dtype=int),
-        "edge_valve": np.array([e[1] for e in listed], dtype=int),
-        "edge_value": np.array([e[2] for e in listed]),
-        "edge_gain": np.array([e[3] for e in listed]).reshape(-1, size) / PERIOD,
+        "edge_tick": np.array([tick for tick, _, _ in listed], dtype=int),
+        "edge_valve": np.array([v for _, v, _ in listed], dtype=int),
+        "edge_value": np.array([float(k % 2 == 0) for _, _, k in listed]),
+        "edge_gain": np.array([gains.get(key, zero) for key in keys]).reshape(size) / PERIOD,
+        "edge_acts": np.array([row for row, _ in late], dtype=int),
+        "edge_late": np.array([change for _, change in late]).reshape(size) * PERIOD,
     }
-
-
-def _to_state(course: EventCourse) -> Array:
-    """At every row the slope (rows, n, 2 measured) of x by what is measured and its rates.
-
-    A knee follows from its piston; chambers are not measured, their deviation is taken as zero.
-    """
-    model, hybrid = course.hybrid.model, course.hybrid
-    pistons = [model.mechanism.port(f"{leg}/piston/x").phi for leg in model.mechanism.legs]
-    knees = [i for i, c in enumerate(model.mechanism.coordinates) if c.name.endswith("/knee/q")]
-    jacobian = ca.jacobian(ca.vertcat(*pistons), model.mechanism.q)
-    slopes = ca.Function("slopes", [model.mechanism.q], [jacobian])
-    found = np.zeros((len(course.states), hybrid.size, 2 * hybrid.n))
-    for row, x in enumerate(course.states):
-        J = np.array(slopes(x[: hybrid.n]))
-        scale = np.ones(hybrid.n)
-        for k, i in enumerate(knees):
-            scale[i] = 1.0 / J[k, i]
-        found[row, : hybrid.n, : hybrid.n] = np.diag(scale)
-        found[row, hybrid.n : 2 * hybrid.n, hybrid.n :] = np.diag(scale)
-    return found
 
 
 def _landing(course: EventCourse) -> float:

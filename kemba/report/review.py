@@ -42,7 +42,7 @@ from kemba.report.motion import (
 )
 from kemba.report.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.view import page_text, stage, write_page
-from kemba.runs import Run, load_run
+from kemba.runs import POLICY, Run, load_run
 from kemba.scene import FLAT, Scene, scene_in
 from kemba.solve.verdict import EXECUTIONS
 from kemba.stopwatch import Tell, silent
@@ -104,7 +104,6 @@ def origin(run: Run) -> Iterable[str]:
     yield folded("Origin", pairs("", facts))
 
 
-POLICY = "policy.npz"
 OPEN = "SHARE of the time in which valves are open"
 
 

@@ -7,11 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kemba.config import Document, dump_yaml
 from kemba.files import WriteError, write_json
 from kemba.ocp import Plan, Task
 from kemba.ocp.continuation.origin import write_stages
-from kemba.runs import PLANT_RUN, STAGES, RunFolder
+from kemba.runs import PLANT_RUN, POLICY, STAGES, RunFolder
 from kemba.solve import Approach, best_plan
 from kemba.solve.loop import Listener
 from kemba.solve.memory import remember
@@ -95,3 +97,6 @@ def _write(found: Plan, result: dict[str, Any], motions: Motions, folder: Path) 
         write_stages(folder / STAGES, found.stages)
     if motions.plant is not None:
         motions.plant.write(folder / PLANT_RUN)
+    if motions.policy is not None:
+        with (folder / POLICY).open("wb") as stream:
+            np.savez_compressed(stream, **motions.policy)  # type: ignore[arg-type]

@@ -75,12 +75,16 @@ def of_plan(certificate: Facts, run: str, events: Events | None) -> ReviewVerdic
         side = "higher" if error >= 0 else "lower"
         lands = "lands and " if plant.get("landed") and not plant.get("end") else ""
         robot = f"the simulated robot {lands}reaches {abs(error):.0f} mm {side}"
+    feedback = certificate.get("feedback")
+    if feedback:
+        robot = f"with feedback by {feedback['by']} the simulated robot keeps to it"
     height = certificate["apex_m"]
+    sent, policy = ("policy.npz", "--policy ") if feedback else ("controller.csv", "")
     return ReviewVerdict(
         "good",
         f"The plan is good: the body's centre reaches {height:.3f} m{feet}; {robot}.",
-        "send controller.csv to the robot, or execute it on the simulated one:",
-        f"kemba-opt simulate {shlex.quote(run)} --repeat 3 --noise",
+        f"send {sent} to the robot, or execute it on the simulated one:",
+        f"kemba-opt simulate {shlex.quote(run)} {policy}--repeat 3 --noise",
     )
 
 

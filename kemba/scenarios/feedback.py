@@ -6,7 +6,7 @@ executions, with corrections of hips and edges in 195; 0.4 m ahead both parts ke
 but 10 of them end more than 5 cm from their place, and with edges alone one (by hand).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +18,10 @@ from kemba.ocp import load_task, task_model
 from kemba.plant.certificate import rest_after
 from kemba.plant.repeat import VALVE_SCATTER, plant_of
 from kemba.policy.execute import execute_policy
+from kemba.policy.modes import Array
 from kemba.policy.player import Policy
-from kemba.policy.write import FILE, write_policy
-from kemba.runs import Run, load_run
+from kemba.policy.write import write_policy
+from kemba.runs import POLICY, Run, load_run
 from kemba.scenarios.draw import Scenario, scenarios, standing
 from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
@@ -45,18 +46,25 @@ class TrialSettings(Settings):
 
 
 def policy_of(run: str | Path, tell: Tell = silent) -> Path:
-    """The policy of a run folder or its table, made where it is missing or older than the table.
+    """The policy of a run folder or its table, made where it is missing, older than the table or of
+    an earlier form.
 
     Raises KembaError where the run has no task or no plan, or no policy can be made.
     """
     own = load_run(run)
-    file, made = own.path / FILE, own.table.stat().st_mtime
-    if not file.is_file() or file.stat().st_mtime < made:
+    file, made = own.path / POLICY, own.table.stat().st_mtime
+    if not file.is_file() or file.stat().st_mtime < made or not _of_this_form(file):
         model = task_model(load_task(own.task)[0])
         with atomic_path(file) as path:
             write_policy(model, own.controller, path)
             _choose(own, model, path, tell)
     return file
+
+
+def _of_this_form(file: Path) -> bool:
+    """Whether a policy estimates the state by maps from tick to tick; earlier ones did not."""
+    with np.load(file, allow_pickle=False) as data:
+        return "A" in data
 
 
 def words_of(file: Path) -> str:
@@ -72,6 +80,12 @@ def words_of(file: Path) -> str:
     return f"feedback by {best} (of {of} executions succeed, and end in place: {counts})"
 
 
+def acting(arrays: Mapping[str, Array], edges: bool, hips: bool) -> dict[str, Array]:
+    """The arrays of a policy of which only these parts act; the others' gains are zero."""
+    kept = {"edge_gain": arrays["edge_gain"] * edges, "hip_gains": arrays["hip_gains"] * hips}
+    return {**arrays, **kept}
+
+
 def _choose(run: Run, model: Model, file: Path, tell: Tell) -> None:
     """Try the whole policy, then its parts; the gains of what is not kept are set to zero in the
     file."""
@@ -82,16 +96,14 @@ def _choose(run: Run, model: Model, file: Path, tell: Tell) -> None:
         found[way] = _tried(run, model, file, way, cases)
         if min(found[way]) == len(cases):
             break
-    edges, hips = WAYS[max(found, key=lambda way: sum(found[way]))]
+    best = max(found, key=lambda way: sum(found[way]))
     succeeded, ended = zip(*found.values(), strict=True)
     with np.load(file, allow_pickle=False) as data:
-        arrays = dict(data)
-    arrays["edge_gain"] *= edges
-    arrays["hip_gains"] *= hips
+        arrays = acting(dict(data), *WAYS[best])
     told = zip(KEPT, (list(found), succeeded, ended, len(cases)), strict=True)
     arrays |= {key: np.array(value) for key, value in told}
     with file.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
 
 
 def _tried(

@@ -19,7 +19,7 @@ from kemba.plant.strides import Stability, stability
 from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of
 from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
 from kemba.stopwatch import Tell, silent
-from kemba.trajectory import Trajectory
+from kemba.trajectory import Array, Trajectory
 
 STRIDES = 5  # of a periodic motion, played in a row
 OWN = ("replay", "table_replay")  # the executions on the plan's own model
@@ -29,7 +29,8 @@ OWN = ("replay", "table_replay")  # the executions on the plan's own model
 class Judged:
     """The entries of a plan's executions in the certificate, the verdict on each, and the motion of
     the plant if it could be started. `truth`: whose verdict counts; `band`: of the apex on models
-    within the uncertainty of a learnt one; `stability`: of a periodic motion."""
+    within the uncertainty of a learnt one; `stability`: of a periodic motion; `feedback`: by which
+    the plant keeps to the plan."""
 
     facts: Mapping[str, Any]
     verdicts: Mapping[str, Verdict]
@@ -37,11 +38,14 @@ class Judged:
     truth: Truth = field(default_factory=lambda: Truth(PLANT))
     band: ApexBand | None = None
     stability: Stability | None = None
+    feedback: Feedback | None = None
 
     @property
     def deciding(self) -> Mapping[str, Verdict]:
-        """The verdicts that decide: a model that was learnt from logs outranks the plant."""
-        return {k: v for k, v in self.verdicts.items() if k in OWN or not self.truth.learnt}
+        """The verdicts that decide: a model that was learnt from logs outranks the plant, which
+        feedback may lead where the table alone does not."""
+        found = {k: v for k, v in self.verdicts.items() if k in OWN or not self.truth.learnt}
+        return {**found, "plant_replay": self.feedback.verdict} if self.feedback else found
 
     @property
     def causes(self) -> list[str]:
@@ -59,6 +63,8 @@ class Judged:
     def remarks(self) -> list[str]:
         """What else is to be said of the executions and of what they rest on."""
         found = [v.sentence for v in self.deciding.values() if v.good]
+        if self.feedback is not None:
+            found[-1] = self.feedback.sentence
         if self.truth.learnt:
             found.append(f"on the simulated robot with physical chambers: {self._plant}")
         if self.band is not None and self.band.good:
@@ -83,6 +89,29 @@ class Judged:
     def replays(self) -> bool:
         """Whether the executions on the plan's own model do."""
         return all(self.verdicts[name].good for name in OWN)
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """A policy by which the plant keeps to a plan: which parts act, its arrays, the verdict on its
+    worst execution, that on the table alone, and the figures of the former."""
+
+    way: str
+    arrays: Mapping[str, Array]
+    verdict: Verdict
+    alone: Verdict
+    figures: Mapping[str, Any]
+
+    @property
+    def sentence(self) -> str:
+        """What it does, in words."""
+        done = self.verdict.sentence.removeprefix("simulated robot ")
+        with_ = f"with feedback by {self.way} (policy.npz) the simulated robot {done}"
+        return f"{with_}; by controller.csv alone {self.alone.sentence}"
+
+    def json(self) -> dict[str, Any]:
+        """The entry `feedback` of the certificate."""
+        return {"by": self.way, "alone": self.alone.sentence, **self.figures}
 
 
 def plant_of(task: Task) -> Model:

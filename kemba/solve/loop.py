@@ -5,7 +5,8 @@ for each start:                     an earlier plan, one guess after the other
     for each repair:                nothing, edges on ticks
         execute and judge           kemba.solve.trial
     stop if the best trial is good
-give the trial of the best score
+give the trial of the best score; where the plant keeps to none, the best that it keeps to with
+feedback                            kemba.solve.feedback
 """
 
 from __future__ import annotations
@@ -127,19 +128,23 @@ def best_plan(
     deadline = time.monotonic() + task.solver.time_limit
     execution = TrialOrder(approach.replay, listener.tell, place)
     planning = _planning(task, document, approach, listener, deadline)
-    best = last = None
+    tried: list[Trial] = []
     for one in _candidates(planning, approach, listener, deadline):
         first = executed(one.plan, execution, one.table, one.share)
         trials = repaired(first, planning, execution) if approach.replay else iter((first,))
-        for last in trials:
-            best = last if best is None or last.score > best.score else best
-        if best is not None and best.good:
+        tried.extend(trials)
+        best = max(tried, key=lambda trial: trial.score)
+        if best.good:
             break
-    assert best is not None and last is not None
+    last = tried[-1]
     if one.share is not None and best.plan is not one.plan:
         from kemba.solve.robust import with_share
 
         best = with_share(best)
+    elif one.share is None and not best.good:
+        from kemba.solve.feedback import first_with_feedback  # loads SciPy's linear algebra
+
+        best = first_with_feedback(tried, execution, deadline) or best
     if approach.memory:
         from kemba.solve.memory import best_known
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from kemba.errors import KembaError, enumerated
@@ -16,7 +16,7 @@ from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
 from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
-from kemba.trajectory import Trajectory
+from kemba.trajectory import Array, Trajectory
 
 if TYPE_CHECKING:
     from kemba.scenarios.share import Share
@@ -36,10 +36,12 @@ class TrialOrder:
 
 @dataclass(frozen=True)
 class Motions:
-    """What is written beside the plan: the controller's table, and the motion of the plant."""
+    """What is written beside the plan: the controller's table, the motion of the plant, and the
+    arrays of a policy that plays it there."""
 
     table: Trajectory | None = None
     plant: Trajectory | None = None
+    policy: Mapping[str, Array] | None = None
 
 
 @dataclass(frozen=True)
@@ -122,18 +124,29 @@ def executed(
     if share is None:
         near = retimed(found.model, found.trajectory, table)
         table, known = near.table, near.replay
-    done: Judged | None = None
+    trial = Trial(found, result, Motions(table), repair=repair)
     try:
         done = judged(found, table, tell=execution.tell, known=known)
-        result |= {**done.facts, **_confirmed(found, done)}
+        trial = confirmed(replace(trial, judged=done), execution.place)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         result |= _unconfirmed(found, f"it cannot be simulated: {error}")
-    result["sentence"] = "; ".join([result["sentence"], *warnings(found)])
+        result["sentence"] = "; ".join([result["sentence"], *warnings(found)])
     if share is not None:
-        result |= {"robust": share.summary()}
-        result["sentence"] += f"; {share.sentence}"
-    motions = Motions(table, done.motion if done else None)
-    return Trial(found, result, motions, done, repair)
+        trial.result["robust"] = share.summary()
+        trial.result["sentence"] += f"; {share.sentence}"
+    return trial
+
+
+def confirmed(trial: Trial, place: str) -> Trial:
+    """The trial with what its executions, as they were judged, say of it and leave to be written.
+    `place`: the run folder."""
+    found, done = trial.plan, trial.judged
+    assert done is not None
+    result = {**answer(found, place), **done.facts, **_confirmed(found, done)}
+    result["sentence"] = "; ".join([result["sentence"], *warnings(found)])
+    feedback = done.feedback
+    policy = feedback.arrays if feedback else None
+    return replace(trial, result=result, motions=Motions(trial.motions.table, done.motion, policy))
 
 
 def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
@@ -146,7 +159,9 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
     if alike := carried_over(task.model, task.payload):
         names.append(f"the plant has {enumerated(alike)}, too")
-    facts = {"verdict_on": done.truth.on, "band": done.band.json() if done.band else None}
+    facts: dict[str, Any] = {"verdict_on": done.truth.on}
+    facts |= {"band": done.band.json() if done.band else None}
+    facts |= {"feedback": done.feedback.json()} if done.feedback else {}
     if done.good:
         return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}
     return facts | _unconfirmed(found, " and ".join(done.causes), [*names, *done.remarks])

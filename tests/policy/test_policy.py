@@ -11,10 +11,12 @@ from typer.testing import CliRunner
 from kemba.model import Model, load_model
 from kemba.plant.commands import Profile
 from kemba.plant.controller import execute
+from kemba.plant.repeat import Sensors
 from kemba.policy import player
 from kemba.policy.course import course_of
 from kemba.policy.execute import execute_policy
 from kemba.policy.modes import Edge, EventCourse, Saltation
+from kemba.policy.observer import measured, observer_of
 from kemba.policy.player import Policy
 from kemba.policy.write import gains_of, policy_arrays, write_policy
 from kemba.trajectory import Trajectory
@@ -108,6 +110,37 @@ def test_gains_bring_the_body_back(model: Model, table: Trajectory, course: Even
     assert {(e.valve, e.index) for e, _ in gains.edges} == {
         (f"{leg}/valve/extend", k) for leg in ("front", "rear") for k in (0, 1)
     }
+
+
+def test_the_filter_goes_from_tick_to_tick_along_the_course(course: EventCourse) -> None:
+    """Without what a policy adds, and from an edge that comes late on."""
+    found = observer_of(course, np.arange(len(course.states)), 0)
+    through = np.linalg.multi_dot(found.A[20:70][::-1])
+    assert np.allclose(through, course.map(0.02, 0.07), atol=1e-9 * np.abs(through).max())
+    edge = next(e for e in course.events if isinstance(e, Edge))
+    row, change = found.late[edge.valve, edge.index]
+    assert row / 1000 <= edge.time <= (row + 1) / 1000
+    assert np.allclose(change, course.map(edge.time, (row + 1) / 1000) @ edge.late)
+
+
+def test_the_filter_tells_deviations_from_noise(
+    model: Model, table: Trajectory, tmp_path: Path
+) -> None:
+    """Of a body that is turned by 0.02 rad: its pitch, and no rate, of which a line through the
+    last eight readings would tell 0.3 rad/s by noise alone."""
+    file = write_policy(model, table, tmp_path / "policy.npz")
+    turned = execute(table, model, start={"body/pitch": 0.08}).trajectory
+    sigma = np.array([Sensors.usual().noise[n.split("/")[-1]] for n in measured(model)])
+    rng, told = np.random.default_rng(4), []
+    for _ in range(20):
+        policy = Policy(file, retime=False, hips=False)
+        for row in range(25):
+            seen = np.array([turned[name][row] for name in policy.measured])
+            policy.step(seen + sigma * rng.standard_normal(len(seen)), np.zeros(2))
+        told.append([policy.x[states(model).index(f"body/{n}")] for n in ("pitch", "pitch_rate")])
+    (pitch, rate), scatter = np.mean(told, axis=0), np.std(told, axis=0)
+    assert pitch == pytest.approx(0.02, abs=2e-3) and abs(rate) < 0.02
+    assert scatter[0] < sigma[2] and scatter[1] < 0.02
 
 
 def test_the_player_without_corrections_is_the_table(

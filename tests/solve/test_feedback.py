@@ -1,0 +1,37 @@
+"""Where the plant does not keep to the table alone, a plan is played with its policy."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from kemba.files import read_json
+from kemba.policy.player import Policy
+from kemba_cli.main import app
+
+
+def solved(folder: Path, late: str) -> int:
+    """The exit code of a drop whose touchdown on the plant may err by so much: by its table alone
+    it is 4.5 ms late there."""
+    words = ["solve", "drop.yaml", "--set", "nodes=40", "--no-figure", "-q", "--out", str(folder)]
+    return (
+        CliRunner().invoke(app, [*words, "--set", f"tolerances.plant_touchdown={late}"]).exit_code
+    )
+
+
+def test_feedback_keeps_to_what_the_table_alone_misses(tmp_path: Path) -> None:
+    assert solved(tmp_path / "run", "4 ms") == 0
+    found = read_json(tmp_path / "run" / "certificate.json")
+    assert found["status"] == "solved" and found["good"]
+    assert "by controller.csv alone the simulated robot touches down" in found["sentence"]
+    assert f"with feedback by {found['feedback']['by']} (policy.npz)" in found["sentence"]
+    errors = [abs(f["touchdown_error_s"]) for f in (found["feedback"], found["plant_replay"])]
+    assert errors[0] < 4e-3 < errors[1]
+    assert Policy(tmp_path / "run" / "policy.npz").x.shape == (18,)
+
+
+@pytest.mark.parametrize(("late", "code"), [("1 ms", 1), ("25 ms", 0)], ids=["neither", "table"])
+def test_feedback_is_kept_only_where_it_decides(late: str, code: int, tmp_path: Path) -> None:
+    assert solved(tmp_path / "run", late) == code
+    found = read_json(tmp_path / "run" / "certificate.json")
+    assert "feedback" not in found and not (tmp_path / "run" / "policy.npz").exists()
