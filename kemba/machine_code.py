@@ -118,7 +118,7 @@ class _Program:
                 place = self._at(f"y{k}", row * output.shape[1] + column)
                 self._lines.append(f"store double {value}, double* {place}")
         head = f"define void @{name}(double* %x, double* %y0, double* %y1) {{"
-        return "\n".join([head, *self._lines, "ret void", "}", _loop(name)])
+        return "\n".join([head, *self._lines, "ret void", "}", LOOP.format(name=name)])
 
     def _apply(self, kind: int, *a: str) -> str:
         if kind in BINARY:
@@ -169,39 +169,31 @@ class _Program:
         return self._new(f"call double @{name}({', '.join(f'double {x}' for x in operands)})")
 
 
-def _loop(name: str) -> str:
-    """The assembly of a function over n rows of x, y0 and y1, which begin dx, d0 and d1 numbers
-    after each other."""
-    parts = (("x", "dx"), ("y0", "d0"), ("y1", "d1"))
-    places = [
-        line
-        for array, stride in parts
-        for line in (
-            f"%at.{array} = mul i64 %i, %{stride}",
-            f"%row.{array} = getelementptr double, double* %{array}, i64 %at.{array}",
-        )
-    ]
-    given = ", ".join(f"double* %row.{array}" for array, _ in parts)
-    return "\n".join(
-        [
-            f"define void @{name}.rows(double* %x, double* %y0, double* %y1, "
-            "i64 %n, i64 %dx, i64 %d0, i64 %d1) {",
-            "begin:",
-            "br label %test",
-            "test:",
-            "%i = phi i64 [0, %begin], [%next, %body]",
-            "%more = icmp slt i64 %i, %n",
-            "br i1 %more, label %body, label %end",
-            "body:",
-            *places,
-            f"call void @{name}({given})",
-            "%next = add i64 %i, 1",
-            "br label %test",
-            "end:",
-            "ret void",
-            "}",
-        ]
-    )
+# the assembly of a function over n rows of x, y0 and y1, which begin dx, d0 and d1 numbers after
+# each other
+LOOP = """
+define void @{name}.rows(double* %x, double* %y0, double* %y1,
+                         i64 %n, i64 %dx, i64 %d0, i64 %d1) {{
+begin:
+  br label %test
+test:
+  %i = phi i64 [0, %begin], [%next, %body]
+  %more = icmp slt i64 %i, %n
+  br i1 %more, label %body, label %end
+body:
+  %at.x = mul i64 %i, %dx
+  %at.y0 = mul i64 %i, %d0
+  %at.y1 = mul i64 %i, %d1
+  %row.x = getelementptr double, double* %x, i64 %at.x
+  %row.y0 = getelementptr double, double* %y0, i64 %at.y0
+  %row.y1 = getelementptr double, double* %y1, i64 %at.y1
+  call void @{name}(double* %row.x, double* %row.y0, double* %row.y1)
+  %next = add i64 %i, 1
+  br label %test
+end:
+  ret void
+}}
+"""
 
 
 def _number(value: float) -> str:
