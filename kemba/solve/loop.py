@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
-from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import dear
@@ -67,8 +66,11 @@ def _on_ticks(old: Plan, planning: Planning) -> Plan | None:
     near, _ = planning.continued(origin)
     if near is None or near.status is not Status.SOLVED:
         return None
-    before = objective(old.model, old.task, old.requirements, old.trajectory)
-    return None if dear(near, before) else replace(near, continued=old.continued, start=old.start)
+    return (
+        None
+        if dear(near, old.objective)
+        else replace(near, continued=old.continued, start=old.start)
+    )
 
 
 UNTRIED = "the time limit came before it was executed in any scenario"
