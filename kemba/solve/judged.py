@@ -1,7 +1,5 @@
 """A plan executed on its own model and on the plant, against what its task allows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

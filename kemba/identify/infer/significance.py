@@ -1,7 +1,5 @@
 """Is anything missing at all? What the best effect gains, and what chance would."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Evidence for "these effects are large and all others are small", by linear algebra."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import comb

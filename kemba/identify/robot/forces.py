@@ -6,8 +6,6 @@ strength is learnt from the data; a channel that needs no force ends with almost
 the contact forces are unknown too, so only the force that they cannot explain is found.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ learnt from the filter's errors, missing forces are kinds of noise, too, so that
 is not taken for the noise of a sensor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

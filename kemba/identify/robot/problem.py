@@ -1,7 +1,5 @@
 """Robot logs under one model as whitened residuals: the innovations of a filter around the data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace

@@ -4,8 +4,6 @@ What a command does shows in the motion only: each mistake about commands is jud
 residual of the whole log along the same measured motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
