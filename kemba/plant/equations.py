@@ -273,7 +273,7 @@ def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) 
     if mechanism.drawn is None:
         return Equations(model)
     lengths = tuple(sorted(mechanism.offsets.items()))
-    robot = mechanism.drawn.model_dump_json(), lengths, repr(mechanism.scene.json())
+    robot = mechanism.drawn.model_dump_json(), lengths, repr(mechanism.scene.dump())
     key = (robot, structure, tuple(numbers.items()))
     return _PLAIN.get(key, lambda: Equations(model), MODELS)
 
