@@ -8,6 +8,7 @@ Every function also comes as a loop over rows. Where the output of one row is an
 as with steps in time, it is written there.
 """
 
+import ctypes
 import struct
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -63,8 +64,6 @@ class Native:
         Rows may lie anywhere, each of them in one piece: an output that is a part of x, one row
         further, makes steps in time.
         """
-        import ctypes
-
         arrays = (x, *outputs, np.empty((1, 0)))[:3]
         if any(a.dtype != np.float64 or a.strides[1] != a.itemsize for a in arrays if a.size):
             raise ValueError("rows of doubles in one piece were expected")
@@ -75,8 +74,6 @@ class Native:
 
     def __call__(self, name: str, x: Array, *outputs: Array) -> None:
         """Evaluate one function into arrays in place (for looking at; the kernel calls itself)."""
-        import ctypes
-
         call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         places = [array.ctypes.data for array in (x, *outputs, np.empty(0))[:3]]
         call(self.address[name])(*places)

@@ -8,13 +8,11 @@ for each start:                     an earlier plan, one guess after the other
 give the trial of the best score
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
@@ -24,12 +22,10 @@ from kemba.ocp.finer import dear
 from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, plan_best, spent
+from kemba.scenarios.share import Share
 from kemba.solve.trial import Trial, TrialOrder, executed
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from kemba.scenarios.share import Share
 
 
 @dataclass(frozen=True)

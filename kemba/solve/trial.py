@@ -1,10 +1,8 @@
 """A trial: a plan with its controller table, executed and judged, and its score."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kemba.errors import KembaError, enumerated
 from kemba.ocp import Plan, controller_table
@@ -13,12 +11,10 @@ from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, carried_over, lacking
 from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
+from kemba.scenarios.share import Share
 from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from kemba.scenarios.share import Share
 
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
