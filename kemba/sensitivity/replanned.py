@@ -139,9 +139,9 @@ class Kkt:
         assert point.lam_x is not None
         x, lam, mu = point.Y, point.lam_g, point.lam_x
         problem = program.problem
-        half = _sparse(problem.hess_lag(x, [], 1.0, lam))
+        half = problem.hess_lag(x, [], 1.0, lam).sparse()
         g, jacobian = problem.jac_g(x, [])
-        g, J = np.array(g).ravel(), _sparse(jacobian)
+        g, J = np.array(g).ravel(), jacobian.sparse()
         W = half + sparse.triu(half, 1).T
         free = program.lower < program.upper
         pull = np.abs(mu) / np.maximum(_distance(x, mu, program.lower, program.upper), NEAR)
@@ -181,13 +181,6 @@ def _padded(values: Vector, size: int) -> Vector:
 def _distance(values: Vector, multiplier: Vector, lower: Vector, upper: Vector) -> Vector:
     """How far values are from the bound that their multiplier is about."""
     return np.asarray(np.abs(np.where(multiplier > 0, upper - values, values - lower)))
-
-
-def _sparse(matrix: ca.DM) -> Any:
-    from scipy.sparse import csc_matrix
-
-    starts, rows = matrix.sparsity().get_ccs()
-    return csc_matrix((matrix.nonzeros(), rows, starts), shape=matrix.shape)
 
 
 Problem = tuple[Task, Model]
