@@ -283,7 +283,7 @@ class Characteristics:
 
         Raises KembaError, and writes nothing, where a fitted value is none that a model can have.
         """
-        effects = [_written(effect) for effect in self.effects()]
+        effects = [effect.model_dump(exclude_none=True) for effect in self.effects()]
         notes = "chambers, damping and valves fitted by kemba-opt characterise"
         data = {"name": name, "base": "planning", "effects": effects, "notes": notes}
         parse(Document(data, f"the figures that these logs give {path}"), ModelSpec)
@@ -387,8 +387,3 @@ def _check_columns(name: str, log: Trajectory) -> None:
     for column in ("piston/x", "piston/F", "valve/extend", "valve/retract"):
         if column not in log:
             raise KembaError(name, f"has no column '{column}'", "a bench log was expected")
-
-
-def _written(effect: Any) -> dict[str, Any]:
-    data = effect.model_dump(exclude_none=True)
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in data.items()}
