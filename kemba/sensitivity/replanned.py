@@ -160,22 +160,18 @@ class Kkt:
 
     def answer(self, change: Change) -> Vector:
         """The change (n,) of the variables that a change of the program asks for."""
-        n = len(self.free)
-        moved = _padded(np.where(self.mu[: len(change.upper)] > 0, change.upper, change.lower), n)
+        n, own = len(self.free), len(change.upper)
+        more = (0, n - own)  # the program may have proximal variables
+        moved = np.pad(np.where(self.mu[:own] > 0, change.upper, change.lower), more)
         bound = np.where(self.lam > 0, change.g_upper, change.g_lower)
         right = np.concatenate(
-            [(self.pull * moved - _padded(change.gradient, n))[self.free], bound - change.g]
+            [(self.pull * moved - np.pad(change.gradient, more))[self.free], bound - change.g]
         )
         given = self.fixed @ moved[~self.free]
         right -= np.concatenate([given[:n][self.free], given[n:]])
         dx: Vector = moved.copy()
         dx[self.free] = self.solver.solve(right)[: self.free.sum()]
         return dx
-
-
-def _padded(values: Vector, size: int) -> Vector:
-    """Values with zeros behind them: the program may have proximal variables."""
-    return np.concatenate([values, np.zeros(size - len(values))])
 
 
 def _distance(values: Vector, multiplier: Vector, lower: Vector, upper: Vector) -> Vector:
