@@ -8,6 +8,7 @@ Every function also comes as a loop over rows. Where the output of one row is an
 as with steps in time, it is written there.
 """
 
+import ctypes
 import struct
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
@@ -63,8 +64,6 @@ class Native:
         Rows may lie anywhere, each of them in one piece: an output that is a part of x, one row
         further, makes steps in time.
         """
-        import ctypes
-
         arrays = (x, *outputs, np.empty((1, 0)))[:3]
         if any(a.dtype != np.float64 or a.strides[1] != a.itemsize for a in arrays if a.size):
             raise ValueError("rows of doubles in one piece were expected")
@@ -75,8 +74,6 @@ class Native:
 
     def __call__(self, name: str, x: Array, *outputs: Array) -> None:
         """Evaluate one function into arrays in place (for looking at; the kernel calls itself)."""
-        import ctypes
-
         call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
         places = [array.ctypes.data for array in (x, *outputs, np.empty(0))[:3]]
         call(self.address[name])(*places)
@@ -118,7 +115,7 @@ class _Program:
                 place = self._at(f"y{k}", row * output.shape[1] + column)
                 self._lines.append(f"store double {value}, double* {place}")
         head = f"define void @{name}(double* %x, double* %y0, double* %y1) {{"
-        return "\n".join([head, *self._lines, "ret void", "}", _loop(name)])
+        return "\n".join([head, *self._lines, "ret void", "}", LOOP.format(name=name)])
 
     def _apply(self, kind: int, *a: str) -> str:
         if kind in BINARY:
@@ -169,39 +166,31 @@ class _Program:
         return self._new(f"call double @{name}({', '.join(f'double {x}' for x in operands)})")
 
 
-def _loop(name: str) -> str:
-    """The assembly of a function over n rows of x, y0 and y1, which begin dx, d0 and d1 numbers
-    after each other."""
-    parts = (("x", "dx"), ("y0", "d0"), ("y1", "d1"))
-    places = [
-        line
-        for array, stride in parts
-        for line in (
-            f"%at.{array} = mul i64 %i, %{stride}",
-            f"%row.{array} = getelementptr double, double* %{array}, i64 %at.{array}",
-        )
-    ]
-    given = ", ".join(f"double* %row.{array}" for array, _ in parts)
-    return "\n".join(
-        [
-            f"define void @{name}.rows(double* %x, double* %y0, double* %y1, "
-            "i64 %n, i64 %dx, i64 %d0, i64 %d1) {",
-            "begin:",
-            "br label %test",
-            "test:",
-            "%i = phi i64 [0, %begin], [%next, %body]",
-            "%more = icmp slt i64 %i, %n",
-            "br i1 %more, label %body, label %end",
-            "body:",
-            *places,
-            f"call void @{name}({given})",
-            "%next = add i64 %i, 1",
-            "br label %test",
-            "end:",
-            "ret void",
-            "}",
-        ]
-    )
+# the assembly of a function over n rows of x, y0 and y1, which begin dx, d0 and d1 numbers after
+# each other
+LOOP = """
+define void @{name}.rows(double* %x, double* %y0, double* %y1,
+                         i64 %n, i64 %dx, i64 %d0, i64 %d1) {{
+begin:
+  br label %test
+test:
+  %i = phi i64 [0, %begin], [%next, %body]
+  %more = icmp slt i64 %i, %n
+  br i1 %more, label %body, label %end
+body:
+  %at.x = mul i64 %i, %dx
+  %at.y0 = mul i64 %i, %d0
+  %at.y1 = mul i64 %i, %d1
+  %row.x = getelementptr double, double* %x, i64 %at.x
+  %row.y0 = getelementptr double, double* %y0, i64 %at.y0
+  %row.y1 = getelementptr double, double* %y1, i64 %at.y1
+  call void @{name}(double* %row.x, double* %row.y0, double* %row.y1)
+  %next = add i64 %i, 1
+  br label %test
+end:
+  ret void
+}}
+"""
 
 
 def _number(value: float) -> str:

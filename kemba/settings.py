@@ -24,7 +24,6 @@ from typing_extensions import dataclass_transform
 from kemba.errors import KembaError, suggest
 
 ORIGINS = ("derived", "literature", "tuned", "convention")
-BY_HAND = "tuned: by hand on the twin of tests/twin, no benchmark"
 CHOSEN = "convention: chosen by hand, no comparison kept"
 
 S = TypeVar("S", bound="Settings")

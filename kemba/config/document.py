@@ -56,8 +56,6 @@ def _dumper() -> Any:
 
 def _whole(pattern: Any) -> Any:
     """The pattern for PyYAML, which asks `match` only."""
-    import re
-
     return re.compile(rf"(?:{pattern.pattern})\Z")
 
 

@@ -1,25 +1,20 @@
 """Configuration files: from YAML to checked data, every mistake at its line."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, get_args
+from typing import Any, NamedTuple, TypeVar, get_args
+
+from pydantic import BaseModel, ValidationError
 
 from kemba.config.document import Document, Location, load_text, written
 from kemba.errors import ConfigErrors, KembaError, suggest
 from kemba.quantity import Param, expectation
 
-if TYPE_CHECKING:
-    from pydantic import BaseModel, ValidationError
-
-    Schema = TypeVar("Schema", bound=BaseModel)
-
-
+Schema = TypeVar("Schema", bound=BaseModel)
 RANGE = {"equals", "at_least", "at_most"}
 
 
@@ -28,8 +23,6 @@ def parse(document: Document | Mapping[str, Any], schema: type[Schema]) -> Schem
 
     Raises ConfigErrors with all mistakes: place, what is wrong, what was expected.
     """
-    from pydantic import ValidationError
-
     if not isinstance(document, Document):
         document = Document(dict(document))
     try:
@@ -382,8 +375,6 @@ def _shown(value: Any) -> str:
 
 def sound(document: Document, schema: type[BaseModel]) -> Document:
     """The document without the parts at which the schema finds a mistake."""
-    from pydantic import ValidationError
-
     try:
         schema.model_validate(document.data)
     except ValidationError as error:

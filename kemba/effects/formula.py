@@ -68,8 +68,7 @@ class _Dimensions:
         if isinstance(node, ast.Name):
             return _Dimension(parse_unit(self.units[node.id]))
         if isinstance(node, ast.UnaryOp):
-            inner = self.of(node.operand)
-            return _Dimension(inner.unit, None if inner.number is None else -inner.number)
+            return self.of(node.operand)
         if isinstance(node, ast.BinOp):
             return self._binary(node)
         assert isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
@@ -83,10 +82,7 @@ class _Dimensions:
             return self._alike(node, left, right)
         if isinstance(node.op, ast.Mult):
             return _Dimension(left.unit * right.unit)
-        number = None
-        if left.number is not None and right.number:
-            number = left.number / right.number  # so that v**(3/2) has a dimension
-        return _Dimension(left.unit / right.unit, number)
+        return _Dimension(left.unit / right.unit)
 
     def _power(self, node: ast.BinOp, base: _Dimension, exponent: _Dimension) -> _Dimension:
         if not exponent.pure:
@@ -138,9 +134,6 @@ PURE: dict[str, Callable[..., Any]] = {  # of one number without dimension
 }
 SAME: dict[str, Callable[..., Any]] = {"abs": ca.fabs, "min": ca.fmin, "max": ca.fmax}
 FUNCTIONS: dict[str, Callable[..., Any]] = {**PURE, **SAME, "sqrt": ca.sqrt}
-OF_NUMBERS: dict[str, Callable[..., float]] = {  # the same on floats, ValueError outside the domain
-    **{name: getattr(math, name) for name in (*PURE, "sqrt")}, "abs": abs, "min": min, "max": max,
-}  # fmt: skip
 
 
 def parse_formula(text: str) -> ast.expr:
@@ -159,7 +152,8 @@ def parse_formula(text: str) -> ast.expr:
     _check_depth(tree)
     for node in ast.walk(tree):
         _check(node)
-    return _folded(tree)
+    folded: ast.expr = _Folding().visit(tree)
+    return folded
 
 
 def names_of(tree: ast.expr) -> set[str]:
@@ -212,40 +206,21 @@ def _check_depth(tree: ast.expr) -> None:
     raise ValueError(f"is nested deeper than {DEEPEST} operations")
 
 
-def _folded(node: ast.expr) -> ast.expr:
-    """The tree with every part that reads no name as one number, which must be finite."""
-    if isinstance(node, ast.Constant):
-        return _number(node, lambda: float(node.value))  # type: ignore[arg-type]
-    if isinstance(node, ast.UnaryOp):
-        operand = _folded(node.operand)
-        if isinstance(operand, ast.Constant):
-            sign = -1.0 if isinstance(node.op, ast.USub) else 1.0
-            return ast.Constant(sign * operand.value)  # type: ignore[operator]
-        return ast.UnaryOp(node.op, operand)
-    if isinstance(node, ast.BinOp):
-        left, right = _folded(node.left), _folded(node.right)
-        if isinstance(left, ast.Constant) and isinstance(right, ast.Constant):
-            compute = OPERATORS[type(node.op)]
-            return _number(node, lambda: compute(left.value, right.value))
-        return ast.BinOp(left, node.op, right)
-    if isinstance(node, ast.Call):
-        args = [_folded(arg) for arg in node.args]
-        if all(isinstance(arg, ast.Constant) for arg in args):
-            call = OF_NUMBERS[node.func.id]  # type: ignore[attr-defined]
-            return _number(node, lambda: call(*(arg.value for arg in args)))  # type: ignore[attr-defined]
-        return ast.Call(node.func, args, [])
-    return node
+class _Folding(ast.NodeTransformer):
+    """Puts every part that reads no name as one number, which must be finite."""
 
-
-def _number(node: ast.expr, compute: Callable[[], Any]) -> ast.Constant:
-    """The value of a constant part; ValueError when it is no finite real number."""
-    try:
-        value = compute()
-    except (ArithmeticError, ValueError):
-        value = math.nan
-    if isinstance(value, complex) or not math.isfinite(value):
-        raise ValueError(f"'{ast.unparse(node)[:60]}' has no finite value")
-    return ast.Constant(float(value))
+    def visit(self, node: ast.AST) -> Any:
+        written = ast.unparse(node)[:60]
+        self.generic_visit(node)
+        if not isinstance(node, ast.expr) or names_of(node):
+            return node
+        try:
+            value = 1.0 * evaluate(node, {})
+        except ArithmeticError:
+            value = math.nan
+        if isinstance(value, complex) or not math.isfinite(value):
+            raise ValueError(f"'{written}' has no finite value")
+        return ast.Constant(float(value))
 
 
 def _check(node: ast.AST) -> None:

@@ -5,8 +5,6 @@ Code from outside is run with all rights of the user. It is only ever named by t
 installed package or by `--effects`; nothing in a YAML or a log can name it.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 import traceback
@@ -15,15 +13,13 @@ from hashlib import sha256
 from importlib import metadata, util
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Annotated, Any, Union
+from typing import Annotated, Any, Union
+
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter
+from pydantic_core import CoreSchema, core_schema
 
 from kemba.effects.base import Effect
 from kemba.errors import KembaError
-
-if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter
-    from pydantic_core import CoreSchema
-
 
 GROUP = "kemba.effects"  # entry points
 NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -201,8 +197,6 @@ class Registry(Mapping[str, type[Effect]]):
     @property
     def union(self) -> TypeAdapter[Any]:
         """Reads an effect of any kind; its `kind` says which."""
-        from pydantic import Field, TypeAdapter
-
         known = tuple(self._all().values())
         if self._union is None:
             choice: Any = Annotated[Union[known], Field(discriminator="kind")]  # noqa: UP007
@@ -229,8 +223,6 @@ class Registered:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        from pydantic_core import core_schema
-
         return core_schema.no_info_plain_validator_function(self._read)
 
     def __get_pydantic_json_schema__(

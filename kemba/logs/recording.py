@@ -39,7 +39,7 @@ class Group:
     time: Column
     time_unit: str
     columns: Raw
-    units: Mapping[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
 
 def recording(groups: Sequence[Group], remarks: Iterable[str] = ()) -> Recording:
@@ -65,27 +65,15 @@ def shared(groups: Iterable[Group]) -> list[Group]:
     found: list[Group] = []
     for group in groups:
         path = f"{group.name}/" if group.name else ""
-        own = Group(
-            "",
-            group.time,
-            group.time_unit,
-            {path + name: values for name, values in group.columns.items()},
-            {path + name: unit for name, unit in group.units.items()},
-        )
-        same = next(
-            (
-                i
-                for i, g in enumerate(found)
-                if (g.time_unit == own.time_unit and np.array_equal(g.time, own.time))
-            ),
-            None,
-        )
-        if same is None:
-            found.append(own)
-            continue
-        other = found[same]
-        both = {**other.columns, **own.columns}
-        found[same] = Group("", other.time, other.time_unit, both, {**other.units, **own.units})
+        columns = {path + name: values for name, values in group.columns.items()}
+        units = {path + name: unit for name, unit in group.units.items()}
+        same = (g for g in found if g.time_unit == group.time_unit)
+        other = next((g for g in same if np.array_equal(g.time, group.time)), None)
+        if other is None:
+            found.append(Group("", group.time, group.time_unit, columns, units))
+        else:
+            other.columns.update(columns)
+            other.units.update(units)
     return found
 
 

@@ -5,8 +5,6 @@ It is of second order, exact for a lag of constant input however short, and stab
 are stiff: air that flows between nearly equal pressures answers within a fifth of a millisecond.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 from weakref import WeakKeyDictionary

@@ -101,7 +101,7 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
         {
             "kind": "controller",
             "lead": lead / round(1 / PERIOD),
-            **model.mechanism.scene.json(),
+            **model.mechanism.scene.dump(),
         },
     )
 

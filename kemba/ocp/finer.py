@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import ceil
 
-from kemba.ocp.certificate.certify import costs, objective
+from kemba.ocp.certificate.certify import costs
 from kemba.ocp.certificate.status import Status, missed_of, verdict
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
 from kemba.ocp.continuation.origin import Origin
@@ -69,8 +69,7 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
 def dear(found: Plan, before: float) -> bool:
     """Whether a plan costs so much more than `before`, by its task's own cost, that one from a
     guess is likely to cost less."""
-    own = objective(found.model, found.task, found.requirements, found.trajectory)
-    return own > Continuing.most(before)
+    return found.objective > Continuing.most(before)
 
 
 def from_scratch(found: Plan, why: str) -> Plan:

@@ -10,7 +10,7 @@ import numpy as np
 
 from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
-from kemba.ocp.certificate.certify import Certificate, certify, costs
+from kemba.ocp.certificate.certify import Certificate, certify, costs, objective
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
@@ -55,6 +55,11 @@ class Plan:
     def iterations(self) -> int:
         """IPOPT iterations over all solves."""
         return sum(a.iterations for a in self.attempts)
+
+    @property
+    def objective(self) -> float:
+        """What its task minimises: weighted costs, less what is gained by quantities it aims at."""
+        return objective(self.model, self.task, self.requirements, self.trajectory)
 
 
 def judge(

@@ -19,7 +19,6 @@ from kemba.config import Document
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
 from kemba.model import Model
-from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import Judge, continued, found_and_refined, from_scratch, with_grip
@@ -346,5 +345,4 @@ def _start(task: Task, deadline: float) -> Start:
     if time.monotonic() >= deadline:
         return Start(task.seed, Status.LIMIT, np.inf)
     found = plan(task, deadline=deadline)
-    cost = objective(found.model, task, found.requirements, found.trajectory)
-    return Start(task.seed, found.status, cost)
+    return Start(task.seed, found.status, found.objective)

@@ -283,7 +283,7 @@ class Characteristics:
 
         Raises KembaError, and writes nothing, where a fitted value is none that a model can have.
         """
-        effects = [_written(effect) for effect in self.effects()]
+        effects = [effect.model_dump(exclude_none=True) for effect in self.effects()]
         notes = "chambers, damping and valves fitted by kemba-opt characterise"
         data = {"name": name, "base": "planning", "effects": effects, "notes": notes}
         parse(Document(data, f"the figures that these logs give {path}"), ModelSpec)
@@ -296,7 +296,9 @@ def characterise(
     """Fit eq. 4 to 7 to bench logs by name, of a cylinder of these dimensions; `supplies` [Pa] of
     logs that do not tell theirs. Raises KembaError when they hold nothing to fit."""
     for name, log in logs.items():
-        _check_columns(name, log)
+        for column in ("piston/x", "piston/F", "valve/extend", "valve/retract"):
+            if column not in log:
+                raise KembaError(name, f"has no column '{column}'", "a bench log was expected")
     remarks = tell_supplies(logs, supplies)
     rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
     strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
@@ -381,14 +383,3 @@ def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Tr
     model = Model(rig_mechanism(cylinder), effects, supply, "bench")
     valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)
-
-
-def _check_columns(name: str, log: Trajectory) -> None:
-    for column in ("piston/x", "piston/F", "valve/extend", "valve/retract"):
-        if column not in log:
-            raise KembaError(name, f"has no column '{column}'", "a bench log was expected")
-
-
-def _written(effect: Any) -> dict[str, Any]:
-    data = effect.model_dump(exclude_none=True)
-    return {k: list(v) if isinstance(v, tuple) else v for k, v in data.items()}

@@ -58,16 +58,16 @@ def execute(
 
 
 def execute_many(
-    controller: Trajectory | str | Path, cases: Iterable[Mapping[str, Any]], jobs: int | None = None
+    controller: Trajectory | str | Path, cases: Iterable[Mapping[str, Any]]
 ) -> list[Execution | KembaError]:
-    """Play a controller table under many conditions side by side on `jobs` cores (all of them).
+    """Play a controller table under many conditions side by side on all cores.
 
     Each case holds the arguments of `execute` but the first, as `{"model": ..., "start": ...}`.
     An execution that fails gives its error. Raises KembaError where a case makes no sense.
     """
     table = read_controller(controller)
     ready = [condition_of(table, **case) for case in cases]
-    done = run_many((condition for condition, _ in ready), jobs)
+    done = run_many(condition for condition, _ in ready)
     return [
         d if isinstance(d, KembaError) else Execution(later(d, begin), table)
         for d, (_, begin) in zip(done, ready, strict=True)

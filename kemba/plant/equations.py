@@ -10,7 +10,7 @@ velocities and forces, such as a friction cone.
 """
 
 import weakref
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -24,7 +24,8 @@ from kemba.machine_code import Native
 from kemba.mechanism import Mechanism
 from kemba.model import SUPPLY, Model
 from kemba.model.model import Node
-from kemba.plant.kernel.machine import GAMMA, SPEED, SPIN, Array, KernelModel
+from kemba.model.rest import rate_of
+from kemba.plant.kernel.machine import SPEED, SPIN, Array, KernelModel
 
 
 @dataclass(frozen=True)
@@ -117,67 +118,11 @@ def _depends(expression: ca.SX, symbols: ca.SX) -> bool:
     return any(ca.which_depends(ca.vec(expression), symbols, 1, True))
 
 
-class Compiled:
-    """A function of named vectors on fixed memory: called with values, it returns views.
-
-    The views are overwritten by the next call.
-    """
-
-    def __init__(
-        self, name: str, inputs: Mapping[str, ca.SX], outputs: Mapping[str, ca.SX]
-    ) -> None:
-        flat = [
-            ca.densify(ca.vertcat(*(ca.vec(ca.densify(value)) for value in group.values())))
-            for group in (inputs, outputs)
-        ]
-        self.function = ca.Function(name, flat[:1], flat[1:])
-        x, y = np.zeros(flat[0].numel()), np.zeros(flat[1].numel())
-        self._x = _views(x, {key: value.shape for key, value in inputs.items()})
-        self._y = _views(y, {key: value.shape for key, value in outputs.items()})
-        buffer: Any
-        buffer, self._call = self.function.buffer()
-        buffer.set_arg(0, memoryview(x))  # type: ignore[arg-type]
-        buffer.set_res(0, memoryview(y))  # type: ignore[arg-type]
-        self._buffer = buffer  # holds the memory
-
-    def __call__(self, **values: Any) -> dict[str, Array]:
-        for key, value in values.items():
-            self._x[key][...] = value
-        self._call()
-        return self._y
-
-
-def _views(flat: Array, shapes: Mapping[str, tuple[int, int]]) -> dict[str, Array]:
-    views, start = {}, 0
-    for key, (rows, columns) in shapes.items():
-        part = flat[start : start + rows * columns]
-        views[key] = part if columns == 1 else part.reshape((rows, columns), order="F")
-        start += rows * columns
-    return views
-
-
-class Forms:
-    """Expressions of a node's q, v, s, u and p, and the functions that evaluate them elsewhere.
-
-    `parts`: M (n, n), F (n,), B (n, nl), f (ns,). `D` (n, n) = dF/dv and `A` (ns, ns) = df/ds are
-    the stiff blocks. `pairs`: the complementarity pairs.
-    Raises KembaError where an effect breaks the affine form.
-    """
-
-    def __init__(self, node: Node) -> None:
-        self.pairs = read_pairs(node)
-        self.parts = _affine(node)
-        _, F, _, f = self.parts
-        self.D, self.A = ca.jacobian(F, node.v), ca.jacobian(f, node.s)
-        state = [node.q, node.v, node.s, node.u]
-        self.rates = ca.Function("rates", state, [f], {"allow_free": True})
-        self.stiff_rates = ca.Function("stiff_rates", state, [self.A], {"allow_free": True})
-
-
 def _affine(node: Node) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """M, F, B and f of a node."""
+    """M (n, n), F (n,), B (n, nl) and f (ns,) of a node. Raises KembaError where an effect breaks
+    the affine form."""
     M, B = ca.jacobian(node.dynamics, node.a), -ca.jacobian(node.dynamics, node.lam)
-    f = -ca.substitute([node.rate], [node.sd], [ca.SX.zeros(node.sd.numel())])[0]
+    f = rate_of(node)
     moving = ca.vertcat(node.a, node.lam, node.sd)
     for rows, form in ((node.dynamics_rows, ca.horzcat(M, B)), (node.rate_rows, f)):
         if form.numel() and any(ca.which_depends(ca.vec(ca.densify(form)), moving, 1, True)):
@@ -189,38 +134,6 @@ def _affine(node: Node) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     zero = [ca.SX.zeros(node.a.numel()), ca.SX.zeros(node.lam.numel())]
     bias = ca.substitute([node.dynamics], [node.a, node.lam], zero)[0]
     return M, -bias, B, f
-
-
-Symbols = dict[str, ca.SX]
-
-
-def impose(forms: Forms, at: Symbols) -> tuple[Symbols, Symbols]:
-    """A step of the effect states from (q, v) to imposed (q1, v1): inputs and outputs."""
-    s, u, h = at["s"], at["u"], ca.SX.sym("h")
-    q1, v1 = ca.SX.sym("q1", at["q"].numel()), ca.SX.sym("v1", at["v"].numel())
-    f = forms.rates(at["q"], at["v"], s, u)
-    left = ca.SX.eye(s.numel()) - GAMMA * h * forms.stiff_rates(at["q"], at["v"], s, u)
-    k1 = eliminate(left, f)
-    f1 = forms.rates(q1, v1, s + h * k1, u)
-    k2 = eliminate(left, f1 - 2 * k1)
-    return {**at, "q1": q1, "v1": v1, "h": h}, {"s": s + h * (3 * k1 + k2) / 2}
-
-
-def eliminate(A: ca.SX, B: ca.SX) -> ca.SX:
-    """Solution X of A X = B by elimination without pivoting, as an expression.
-
-    For matrices whose symmetric part is positive definite, as inertia with dissipation is.
-    """
-    A, B = ca.densify(A), ca.densify(B)
-    n = A.shape[0]
-    for k in range(n):
-        for i in range(k + 1, n):
-            ratio = A[i, k] / A[k, k]
-            A[i, k + 1 :] -= ratio * A[k, k + 1 :]
-            B[i, :] -= ratio * B[k, :]
-    for k in reversed(range(n)):
-        B[k, :] = (B[k, :] - ca.mtimes(A[k, k + 1 :], B[k + 1 :, :])) / A[k, k]
-    return B
 
 
 def numbers_of(model: Model) -> dict[str, float]:
@@ -237,16 +150,15 @@ class Equations:
     """What the plant knows of a model; `free` names its parameters that each run may change,
     `scaled` the entries of its tables, by a factor each.
 
-    `machine` is for the kernel. `now(q, v, s, u)`: M (n, n), F (n,), B (n, nl) and f (ns,) at a
-    state. `driven`: a step of the effect states when the motion is imposed. `measure`: outputs.
+    `machine` is for the kernel; `parts`: M (n, n), F (n,), B (n, nl) and f (ns,) as expressions of
+    the node's q, v, s, u and p.
     """
 
     def __init__(self, model: Model, free: Sequence[str] = (), scaled: Sequence[str] = ()) -> None:
         self.free, self.scaled = tuple(free), tuple(scaled)
         self.node: Node = model.build(free, scaled) if free or scaled else model.node
         self._own = numbers_of(model)
-        self.forms = Forms(self.node)
-        self.pairs: PairTable = self.forms.pairs
+        self.pairs, self.parts = read_pairs(self.node), _affine(self.node)
 
     def values(self, model: Model) -> Array:
         """The free parameters and factors (np,) of a model that shares these equations."""
@@ -292,43 +204,17 @@ class Equations:
     @cached_property
     def native(self) -> Native:
         """The model's functions in machine code, as `KernelModel` describes them."""
-        node, forms = self.node, self.forms
-        M, F, B, f = forms.parts
-        n, ns = node.q.numel(), node.s.numel()
-        blank = ca.SX(n, n), ca.SX(ns, ns)
+        node, (M, F, B, f) = self.node, self.parts
+        D, A = ca.jacobian(F, node.v), ca.jacobian(f, node.s)
         x = [node.q, node.v, node.s, node.u, node.p, node.a, node.lam]
-        rest = ca.SX.zeros(ns)
+        outputs = ca.SX(ca.vertcat(*(node.outputs[o.name] for o in node.output_quantities)))
         functions = {
-            "full": [ca.horzcat(forms.D, M, F, B), ca.horzcat(forms.A, f)],
-            "smooth": [ca.horzcat(blank[0], M, F, B), ca.horzcat(blank[1], f)],
+            "full": [ca.horzcat(D, M, F, B), ca.horzcat(A, f)],
+            "smooth": [ca.horzcat(ca.SX(*D.shape), M, F, B), ca.horzcat(ca.SX(*A.shape), f)],
             "pairs": [ca.horzcat(self.pairs.W, self.pairs.L, self.pairs.w0), self.pairs.gap],
-            "outputs": ca.substitute([self._outputs], [node.sd], [rest]),
+            "outputs": [ca.substitute(outputs, node.sd, ca.SX.zeros(node.sd.numel()))],
         }
         return Native(x, functions)
-
-    @cached_property
-    def now(self) -> Compiled:
-        """M, F, B and f at a state."""
-        parts = dict(zip(("M", "F", "B", "f"), self.forms.parts, strict=True))
-        return Compiled("now", self._symbols("q", "v", "s", "u"), parts)
-
-    @cached_property
-    def driven(self) -> Compiled:
-        """A step of the effect states along an imposed motion."""
-        return Compiled("driven", *impose(self.forms, self._symbols("q", "v", "s", "u")))
-
-    @cached_property
-    def measure(self) -> Compiled:
-        """The outputs."""
-        symbols = self._symbols("q", "v", "a", "s", "sd", "lam", "u")
-        return Compiled("measure", symbols, {"y": self._outputs})
-
-    @property
-    def _outputs(self) -> ca.SX:
-        return ca.SX(ca.vertcat(*(self.node.outputs[o.name] for o in self.node.output_quantities)))
-
-    def _symbols(self, *names: str) -> dict[str, ca.SX]:
-        return {name: getattr(self.node, name) for name in names}
 
 
 # models whose machine code is kept (twice those of a plan: its model and its plant, each with
@@ -387,7 +273,7 @@ def _plain(model: Model, structure: tuple[Any, ...], numbers: dict[str, float]) 
     if mechanism.drawn is None:
         return Equations(model)
     lengths = tuple(sorted(mechanism.offsets.items()))
-    robot = mechanism.drawn.model_dump_json(), lengths, repr(mechanism.scene.json())
+    robot = mechanism.drawn.model_dump_json(), lengths, repr(mechanism.scene.dump())
     key = (robot, structure, tuple(numbers.items()))
     return _PLAIN.get(key, lambda: Equations(model), MODELS)
 

@@ -226,7 +226,7 @@ def repeat_run(
         else:
             done = play(model, sample, [seed, number, 1], noise)
         log = _as_sent(take_log(done.trajectory, sensors, rng, model.effects), done.table)
-        log.meta |= model.mechanism.scene.json()
+        log.meta |= model.mechanism.scene.dump()
         log.meta |= {"run": number, "repeat_of": controller.parent.name, "plant": model.name}
         path = Path(out) / f"log-{number}.csv"
         log.write(path)

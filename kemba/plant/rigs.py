@@ -2,20 +2,21 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import casadi as ca
 import numpy as np
 from pydantic import Field
 
 from kemba.config import FileName, Section, find_config, load_yaml, parse
 from kemba.errors import KembaError
 from kemba.model import Model, load_model
-from kemba.model.rest import at_rest
+from kemba.model.rest import Buffered, at_rest, rate_of
 from kemba.plant.commands import Profile, among, breaks, delayed, input_table, merged
-from kemba.plant.equations import Equations, equations_of
-from kemba.plant.kernel.machine import Array
+from kemba.plant.kernel.machine import GAMMA, Array
 from kemba.plant.repeat import Sensors, take_log
 from kemba.quantity import Param
 from kemba.trajectory import Trajectory
@@ -44,52 +45,47 @@ def drive(
         raise KembaError(model.name, "its motion is free", hint="use kemba.plant.simulate")
     step = STEP if step is None else step
     acting = delayed(model, dict(valves)) if dead_time else dict(valves)
-    eq, first, last = equations_of(model), float(times[0]), float(times[-1])
-    edges = breaks([*acting.values(), *valves.values()], first, last)
-    marks = merged(np.asarray(times, dtype=float), edges)
-    wanted = among(marks, times)
+    times, node = np.asarray(times, dtype=float), model.node
+    edges = breaks([*acting.values(), *valves.values()], times[0], times[-1])
+    marks = merged(times, edges)
     u, sent = (np.nan_to_num(input_table(model, p, marks)) for p in (acting, valves))
     s = at_rest(model, motion(times[:1])[0], u[0]) if start is None else _given(model, start)
-    rows = []
-    for i, time in enumerate(marks):
-        if i:
-            s = _advance(eq, motion, s, u[i - 1], float(marks[i - 1]), float(time), step)
-        if wanted[i]:
-            rows.append(_row(eq, motion, s, u[i], sent[i], float(time)))
-    return _table(model, eq, np.asarray(times, dtype=float), np.array(rows))
-
-
-def _advance(
-    eq: Equations, motion: ImposedMotion, s: Array, u: Array, begin: float, end: float, step: float
-) -> Array:
-    count = max(1, int(np.ceil((end - begin) / step - 1e-6)))
-    grid = np.linspace(begin, end, count + 1)
-    x, v = motion(grid)
-    for i in range(count):
-        s = eq.driven(q=x[i], v=v[i], s=s, u=u, q1=x[i + 1], v1=v[i + 1], h=(end - begin) / count)[
-            "s"
-        ].copy()
-    return s
+    states = [s]
+    for held, (begin, end) in zip(u, pairwise(marks), strict=False):
+        count = max(1, int(np.ceil((end - begin) / step - 1e-6)))
+        for (x, x1), (v, v1) in zip(
+            *map(pairwise, motion(np.linspace(begin, end, count + 1))), strict=True
+        ):
+            (s,) = air_step(model)(x, v, s, held, x1, v1, (end - begin) / count)
+        states.append(s.ravel().copy())
+    wanted = among(marks, times)
+    s, u, sent = np.array(states)[wanted], u[wanted], sent[wanted]
+    still, (x, v) = np.zeros((1, len(times))), motion(times)
+    measured = node.measure.map(len(times))(x[None], v[None], still, s.T, 0.0 * s.T, [], u.T, [])
+    quantities = [*model.states.values(), *model.inputs.values(), *node.output_quantities]
+    columns: dict[str, Array] = {}
+    for quantity, values in zip(quantities, [*s.T, *sent.T, *np.array(measured)], strict=True):
+        columns.setdefault(quantity.header, values)
+    return Trajectory(times, columns)
 
 
 def _given(model: Model, start: Mapping[str, float]) -> Array:
     return np.array([start.get(q.name, q.value) for q in model.states.values()], dtype=float)
 
 
-def _row(
-    eq: Equations, motion: ImposedMotion, s: Array, u: Array, sent: Array, time: float
-) -> Array:
-    x, v = motion(np.array([time]))
-    y = eq.measure(q=x[0], v=v[0], a=0.0, s=s, sd=0.0, lam=0.0, u=u)["y"]
-    return np.concatenate([s, sent, y])
-
-
-def _table(model: Model, eq: Equations, times: Array, rows: Array) -> Trajectory:
-    quantities = [*model.states.values(), *model.inputs.values(), *eq.node.output_quantities]
-    columns: dict[str, Array] = {}
-    for i, quantity in enumerate(quantities):
-        columns.setdefault(quantity.header, rows[:, i])
-    return Trajectory(times, columns)
+@lru_cache(maxsize=8)
+def air_step(model: Model) -> Buffered:
+    """The effect states `h` [s] later while the piston goes from (q, v) to (q1, v1), from
+    (q, v, s, u, q1, v1, h): as a step of the kernel does it, see `kemba.plant.kernel.step`."""
+    node, h = model.node, ca.SX.sym("h")
+    q1, v1 = ca.SX.sym("q1"), ca.SX.sym("v1")
+    rate = rate_of(node)
+    f = ca.Function("f", [node.q, node.v, node.s, node.u], [rate])
+    left = ca.SX.eye(node.s.numel()) - GAMMA * h * ca.jacobian(rate, node.s)
+    k1 = ca.solve(left, rate)
+    k2 = ca.solve(left, f(q1, v1, node.s + h * k1, node.u) - 2 * k1)
+    after = ca.densify(node.s + h * (3 * k1 + k2) / 2)
+    return Buffered(ca.Function("step", [node.q, node.v, node.s, node.u, q1, v1, h], [after]))
 
 
 def locked(x: float) -> ImposedMotion:

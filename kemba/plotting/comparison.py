@@ -274,21 +274,28 @@ def _heat(
     channels: Sequence[str],
     tables: list[list[Column]],
 ) -> None:
-    known = {(c.channel, (c.phase, c.mode, c.region)): c for c in listed}
     grid = room.subplots(len(tables), 1, squeeze=False)[:, 0]
     for axes, columns in zip(grid, tables, strict=True):
-        ratios = np.full((len(channels), len(columns)), np.nan)
-        bold = np.zeros(ratios.shape, bool)
-        for at in np.ndindex(ratios.shape):
-            one = known.get((channels[at[0]], columns[at[1]]))
-            if one is not None:
-                ratios[at], bold[at] = one.ratio, one.significant
-        image = draw_heat(axes, ratios, bold)
+        image = draw_heat(axes, *heat_table(listed, channels, columns))
         axes.set_yticks(range(len(channels)), channels)
         name_conditions(axes, in_words(columns))
     grid[0].set_title("error / noise (bold: significant)", loc="left")
     if len(channels) * len(tables) > 3:  # there is no room for a scale beside one row
         add_bar(room, image, list(grid), "")
+
+
+def heat_table(
+    listed: Sequence[ConditionBin], channels: Sequence[str], columns: Sequence[Column]
+) -> tuple[Array, np.ndarray[Any, Any]]:
+    """Error ratios (channels, columns), NaN where there is no bin, and which are significant."""
+    known = {(c.channel, (c.phase, c.mode, c.region)): c for c in listed}
+    ratios = np.full((len(channels), len(columns)), np.nan)
+    bold = np.zeros(ratios.shape, bool)
+    for at in np.ndindex(ratios.shape):
+        one = known.get((channels[at[0]], columns[at[1]]))
+        if one is not None:
+            ratios[at], bold[at] = one.ratio, one.significant
+    return ratios, bold
 
 
 def bands_of(missing: Sequence[MissingForce], after: Sequence[MissingForce] = ()) -> list[Band]:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import ScaledTranslation
 
 from kemba.errors import KembaError
-from kemba.plotting.source import Machine, Mask, Source, machine_of, stance_spans
+from kemba.plotting.source import Machine, Source, machine_of, stance_spans
 from kemba.plotting.sticks import draw_strip, film, strip_height
 from kemba.plotting.style import (
     BLUE,
@@ -33,7 +33,7 @@ from kemba.plotting.style import (
     shade,
     widen,
 )
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Array
 
 BODY = (
     Panel("body centre z, x [m]", (Trace("body/z", "z"), Trace("body/x", "x")), least=0.2),
@@ -186,7 +186,6 @@ PANELS = (
         raster=True,
     ),
 )
-MODES = {"none": (0, 0), "extend": (1, 0), "retract": (0, 1), "both": (1, 1)}
 LOOKS = {
     "extend": (BLUE, "o"),
     "retract": (VERMILLION, "s"),
@@ -233,16 +232,6 @@ def _joined(source: Source) -> Source:
     return replace(source, trajectory=log.with_columns(joined)) if joined else source
 
 
-def valve_modes(trajectory: Trajectory, leg: str = "") -> dict[str, Mask]:
-    """Rows (n,) in each of the four modes `none`, `extend`, `retract`, `both`."""
-    prefix = f"{leg}/" if leg else ""
-    extend, retract = (trajectory[f"{prefix}valve/{side}"] > 0.5 for side in ("extend", "retract"))
-    return {
-        mode: (extend == bool(on_e)) & (retract == bool(on_r))
-        for mode, (on_e, on_r) in MODES.items()
-    }
-
-
 @paper_style
 def plot_force_velocity(
     points: Mapping[str, tuple[Array, Array]],
@@ -251,7 +240,7 @@ def plot_force_velocity(
 ) -> Figure:
     """Steady force over velocity per valve mode (Fig. 6).
 
-    `points`: velocities [m.s-1] and forces [N] by mode, named as in `MODES`; `lines`: force at
+    `points`: velocities [m.s-1] and forces [N] by mode, named as in `LOOKS`; `lines`: force at
     rest [N] and damping [N.s.m-1] of F = F_0 - c v by mode.
     """
     figure = paper_figure(3.0, 4.2, figure)

@@ -15,6 +15,7 @@ from kemba.identify.infer.windows import free_starts
 from kemba.identify.problem.types import Rows
 from kemba.plotting.comparison import (
     bands_of,
+    heat_table,
     in_words,
     place_of,
     plot_bands,
@@ -64,13 +65,8 @@ def plot_cells(found: Discovery) -> Figure:
     first = next(iter(listed.values()))
     channels = list(dict.fromkeys(c.channel for c in first))
     columns = sorted({(c.phase, c.mode, c.region) for c in first}, key=place_of)
-    tables, bold = {}, {}
-    for title, group in listed.items():
-        tables[title] = np.full((len(channels), len(columns)), np.nan)
-        bold[title] = np.zeros(tables[title].shape, bool)
-        for c in group:
-            at = channels.index(c.channel), columns.index((c.phase, c.mode, c.region))
-            tables[title][at], bold[title][at] = c.ratio, c.significant
+    shown = {title: heat_table(group, channels, columns) for title, group in listed.items()}
+    tables, bold = ({title: pair[i] for title, pair in shown.items()} for i in (0, 1))
     return plot_heat_map(tables, channels, in_words([(c[0], c[1], "") for c in columns]), bold)
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 
 from kemba.model import Model
@@ -113,8 +114,6 @@ def player_of(file: str | Path, run: str | Path) -> Play:
 
 def _knees(model: Model) -> dict[str, tuple[Array, Array]]:
     """Piston extensions over knee angles, by piston column, knee angles ascending."""
-    import casadi as ca
-
     mechanism, found = model.mechanism, {}
     names = [c.name for c in mechanism.coordinates]
     for leg in mechanism.legs:

@@ -209,9 +209,9 @@ def _spread(lam: ca.SX, constraints: Sequence[Constraint], push: ca.SX) -> ca.SX
 
 @dataclass(frozen=True)
 class Flow:
-    """A stretch of time in one mode: when it begins and ends [s], its map of (x, torques)."""
+    """A stretch of time in one mode: its begin and end [s], its map of (x, torques)."""
 
-    begin: float
+    time: float
     end: float
     map: Array  # (n + m, n + m)
 
@@ -266,8 +266,7 @@ class EventCourse:
         n, m = self.hybrid.size, len(self.joints)
         found = np.eye(n + m)
         for event in self.events:
-            time = event.begin if isinstance(event, Flow) else event.time
-            if begin - 1e-9 <= time < end - 1e-9:
+            if begin - 1e-9 <= event.time < end - 1e-9:
                 found = plain(event, n, m) @ found
         return found[:n, :n]
 

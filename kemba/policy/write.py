@@ -54,14 +54,10 @@ def gains_of(course: EventCourse, landing: float) -> PolicyGains:
     No linear map leads through two feet that touch almost at once: the order in which they do
     decides what follows. So the deviation just before the landing is an end of its own.
     """
-    before = [e for e in course.events if _time(e) < landing - 1e-9]
-    after = [e for e in course.events if _time(e) >= landing - 1e-9]
+    before = [e for e in course.events if e.time < landing - 1e-9]
+    after = [e for e in course.events if e.time >= landing - 1e-9]
     first, second = _gains(course, before), _gains(course, after)
     return PolicyGains({**first.hips, **second.hips}, [*first.edges, *second.edges])
-
-
-def _time(event: Event) -> float:
-    return event.begin if isinstance(event, Flow) else event.time
 
 
 def weights(course: EventCourse) -> Array:
@@ -110,7 +106,7 @@ def _gains(course: EventCourse, events: Sequence[Event]) -> PolicyGains:
         else:
             P = through.T @ P @ through
             if isinstance(event, Flow):
-                P += Q * (event.end - event.begin) / FADING
+                P += Q * (event.end - event.time) / FADING
         P = (P + P.T) / 2
         closed.append(through)
     closed.reverse()

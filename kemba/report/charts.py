@@ -40,22 +40,17 @@ class Track:
 
 def gather(run: Run | None, logs: Sequence[Trajectory]) -> list[Track]:
     """The plan and the simulated robot of a run, as far as it has them, then the logs."""
-    tracks = _of_run(run) if run else []
-    table = None
-    if run and (run.path / "controller.csv").is_file():
-        table = run.controller
+    tracks, table = list[Track](), None
+    if run:
+        if (run.path / "trajectory.csv").is_file():
+            tracks.append(Track("plan", "plan", load_source(run.path)))
+        if (run.path / PLANT_RUN).is_file():
+            tracks.append(Track("simulated robot", "plant", load_source(run.path / PLANT_RUN)))
+        if (run.path / "controller.csv").is_file():
+            table = run.controller
     for log in logs[:DRAWN]:
         shown = log if table is None else in_plans_clock(log, table)
         tracks.append(Track(str(log.meta["name"]), "log", Source(log.meta["name"], shown)))
-    return tracks
-
-
-def _of_run(run: Run) -> list[Track]:
-    tracks = []
-    if (run.path / "trajectory.csv").is_file():
-        tracks.append(Track("plan", "plan", load_source(run.path)))
-    if (run.path / PLANT_RUN).is_file():
-        tracks.append(Track("simulated robot", "plant", load_source(run.path / PLANT_RUN)))
     return tracks
 
 
@@ -160,7 +155,8 @@ class Book:
         """The names of the motions as buttons that hide and show them."""
         buttons = (
             f'<button type="button" data-track="{i}" aria-pressed="true">'
-            f'<i style="border-top:3px {_style(track)} {colour(self.tracks, i)}"></i>'
+            f'<i style="border-top:3px {"dashed" if track.role == "plant" else "solid"} '
+            f'{colour(self.tracks, i)}"></i>'
             f"{escape(track.name)}</button>"
             for i, track in enumerate(self.tracks)
         )
@@ -186,10 +182,6 @@ def colour(tracks: Sequence[Track], index: int) -> str:
         return PLAN if role == "plan" else PLANT
     earlier = sum(track.role == "log" for track in tracks[:index])
     return LOGS[earlier % len(LOGS)]
-
-
-def _style(track: Track) -> str:
-    return "dashed" if track.role == "plant" else "solid"
 
 
 def in_words(chart: Chart, grid: Array, tracks: Sequence[Track]) -> str:

@@ -5,12 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.events import (
-    UPRIGHT,
-    ends_standing,
-    gap,
-    turned,
-)
+from kemba.events import UPRIGHT, ends_standing, gap, turned
 from kemba.plotting.source import Machine, stance_spans
 from kemba.report.charts import Book, Chart, Curve, Spans, Track, on_grid, plan_of
 from kemba.trajectory import Trajectory

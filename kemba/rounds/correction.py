@@ -107,12 +107,9 @@ def write_correction(
     path: Path, correction: Correction, moved: dict[str, list[int]], reached: dict[str, Any]
 ) -> None:
     """The correction's own file; `moved`: ticks [ms] by which valve edges moved, by column."""
-    values = {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(correction).items()}
+    told = {"note": NOTE, "unexplained": asdict(correction)}
     units = {"apex": "m", "touchdown": "s"}
-    dump_yaml(
-        {"note": NOTE, "unexplained": values, "units": units, "edges_moved_ms": moved, **reached},
-        path,
-    )
+    dump_yaml({**told, "units": units, "edges_moved_ms": moved, **reached}, path)
 
 
 class AimSettings(Settings):

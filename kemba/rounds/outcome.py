@@ -34,6 +34,9 @@ class ExpectedApex:
     low: float
     high: float
 
+    def __str__(self) -> str:
+        return f"{self.low:.4f} to {self.high:.4f} m"
+
     def holds(self, apex: float) -> bool:
         """Whether an executed apex lies inside."""
         return self.low <= apex <= self.high
@@ -104,7 +107,7 @@ def against(expected: ExpectedApex | None, executed: float) -> str:
     if expected is None:
         return ""
     where = "inside" if expected.holds(executed) else "outside"
-    return f": its apex of {executed:.4f} m lay {where} what was expected, {_band(expected)}"
+    return f": its apex of {executed:.4f} m lay {where} what was expected, {expected}"
 
 
 def learnt(verdict: str, added: Sequence[str], before: float, after: float) -> str:
@@ -128,13 +131,8 @@ def expected(band: ExpectedApex | None, planned: float | None) -> str:
     if band is None or planned is None:
         return ""
     return (
-        f"the next run is expected to reach {band.apex:.4f} m ({_band(band)}), planned are "
-        f"{planned:.4f} m"
+        f"the next run is expected to reach {band.apex:.4f} m ({band}), planned are {planned:.4f} m"
     )
-
-
-def _band(band: ExpectedApex) -> str:
-    return f"{band.low:.4f} to {band.high:.4f} m"
 
 
 def few(logs: Sequence[Path]) -> tuple[str, ...]:

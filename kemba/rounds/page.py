@@ -76,13 +76,9 @@ def _tables(found: Round) -> Iterable[str]:
         yield pairs("the next run", [
             ("planned apex", f"{found.target.apex:.4f} m"),
             ("expected apex", f"{found.aimed.expected.apex:.4f} m"),
-            ("its 95 % band", _band(found.next_expected)),
+            ("its 95 % band", str(found.next_expected or "not known")),
             ("expected touchdown", f"{landing:+.1f} ms from the plan's"),
         ])  # fmt: skip
-
-
-def _band(band: ExpectedApex | None) -> str:
-    return f"{band.low:.4f} to {band.high:.4f} m" if band is not None else "not known"
 
 
 def _growth(found: Round) -> str:
@@ -99,7 +95,7 @@ def _growth(found: Round) -> str:
             "<br>".join(added) or "nothing",
             f"{told['compare_before']:.2f} to {told['compare_after']:.2f}",
             "" if apex is None else f"{apex:.4f} m",
-            "" if band is None else _band(band),
+            "" if band is None else str(band),
             inside,
         ))  # fmt: skip
     heads = ("round", "added to the model", "error / noise", "executed apex", "expected", "inside")

@@ -246,16 +246,9 @@ class Round:
         """The object that `--json` prints."""
         return {
             "round": self.past.round,
-            "verdict": self.answer.verdict,
-            "added": list(self.answer.added),
-            "compare_before": self.compare_before,
-            "compare_after": self.compare_after,
-            "model": self.model,
+            **{name: value for name, value in self.facts.items() if name != "effects"},
             "run": self.result.get("run"),
             "expected_apex_error_m": self.expected_apex_error,
-            "executed_apex_error_m": self.executed_apex_error,
-            "executed_apex_m": self.executed_apex,
-            "was_expected": self.was_expected and self.was_expected.json(),
             "inside": self.was_expected and self.was_expected.holds(self.executed_apex),
             "next_expected": self.next_expected and self.next_expected.json(),
             "unexplained_apex_m": self.correction.apex,

@@ -24,6 +24,7 @@ from kemba.events import STANDS
 from kemba.model import Model
 from kemba.model.spec import Supply
 from kemba.plant.replay import first_row
+from kemba.plant.simulate import initial_values, lowest_foot
 from kemba.quantity import Param
 from kemba.trajectory import Trajectory
 from kemba.units import read_si, to_si
@@ -153,8 +154,6 @@ def start_offsets(model: Model, conditions: Conditions) -> dict[str, float]:
 
 def standing(model: Model, table: Trajectory, offsets: Mapping[str, float]) -> dict[str, float]:
     """The table's first pose, moved; a lower foot that stands is put on the ground again."""
-    from kemba.plant.simulate import initial_values, lowest_foot
-
     if not offsets:
         return {}
     pose = first_row(model, table)

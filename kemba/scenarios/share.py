@@ -62,23 +62,8 @@ class ScenarioOutcome:
     fault: str
 
 
-def share(
-    model: Model,
-    plan: Trajectory,
-    table: Trajectory,
-    cases: Sequence[Scenario],
-    jobs: int | None = None,
-) -> Share:
-    """The share of scenarios in which the controller's table of a plan on `model` succeeds."""
-    return share_of(outcomes(model, plan, table, cases, jobs))
-
-
 def outcomes(
-    model: Model,
-    plan: Trajectory,
-    table: Trajectory,
-    cases: Sequence[Scenario],
-    jobs: int | None = None,
+    model: Model, plan: Trajectory, table: Trajectory, cases: Sequence[Scenario]
 ) -> list[ScenarioOutcome]:
     """What the controller's table of a plan on `model` does in each scenario."""
     rest = rest_after(model, plan, table)
@@ -86,7 +71,7 @@ def outcomes(
         {"model": c.model, "extra": rest, "start": standing(c.model, table, c.start)} for c in cases
     ]
     told = []
-    for case, done in zip(cases, execute_many(table, asked, jobs), strict=True):
+    for case, done in zip(cases, execute_many(table, asked), strict=True):
         if isinstance(done, KembaError):
             told.append(ScenarioOutcome(case, -np.inf, "cannot be simulated"))
             continue

@@ -10,23 +10,19 @@ rounding lies on the lower side: the ground is nowhere lower than the one that i
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import pi, tan
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
+from pydantic_core import CoreSchema, core_schema
 
 from kemba.config import Document, Section, parse
 from kemba.config.document import Location
 from kemba.errors import KembaError
 from kemba.quantity import Param
-
-if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-    from pydantic_core import CoreSchema
 
 
 class Terrain(Section):
@@ -97,8 +93,6 @@ class _OfAnyKind:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        from pydantic_core import core_schema
-
         return core_schema.no_info_plain_validator_function(
             self._read, serialization=core_schema.plain_serializer_function_ser_schema(Terrain.dump)
         )
@@ -276,11 +270,10 @@ AROUND = 0.03  # m; how far a start guess keeps from an obstacle
 POINTS = ("foot", "knee", "hip")  # of a leg; hips are the corners of the body
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(Section):
     """Lines of terrain and obstacles; flat at 0 without any. Equal scenes say the same."""
 
-    terrain: tuple[Terrain, ...] = ()
+    terrain: tuple[AnyTerrain, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
 
     @cached_property
@@ -308,11 +301,9 @@ class Scene:
             low = np.where(near, box.top(self.ground) + AROUND, low)
         return low
 
-    def json(self) -> dict[str, Any]:
+    def dump(self) -> dict[str, Any]:
         """Its keys as a file writes them."""
-        boxes = [o.model_dump(mode="json", by_alias=True) for o in self.obstacles]
-        lines = [t.dump() for t in self.terrain]
-        return {k: v for k, v in (("terrain", lines), ("obstacles", boxes)) if v}
+        return self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
 
     def faults(self) -> Iterator[tuple[Location, str]]:
         """What cannot be, and where: lines of terrain or obstacles that overlap."""
@@ -338,21 +329,13 @@ class Scene:
 FLAT = Scene()
 
 
-class SceneKeys(Section):
-    """The keys of a scene in the sidecar of a log."""
-
-    terrain: tuple[AnyTerrain, ...] = ()
-    obstacles: tuple[Obstacle, ...] = ()
-
-
 def scene_in(meta: Mapping[str, Any], where: str = "") -> Scene:
     """The scene that a sidecar, or the data of a task, says. Raises KembaError where it is wrong,
     at `where`."""
-    given = {key: meta[key] for key in SceneKeys.model_fields if meta.get(key)}
+    given = {key: meta[key] for key in Scene.model_fields if meta.get(key)}
     if not given:
         return FLAT
-    keys = parse(Document(given, where), SceneKeys)
-    scene = Scene(keys.terrain, keys.obstacles)
+    scene = parse(Document(given, where), Scene)
     for location, what in scene.faults():
         raise KembaError(where, f"{location[0]}[{location[1]}]: {what}")
     return scene

@@ -139,9 +139,9 @@ class Kkt:
         assert point.lam_x is not None
         x, lam, mu = point.Y, point.lam_g, point.lam_x
         problem = program.problem
-        half = _sparse(problem.hess_lag(x, [], 1.0, lam))
+        half = problem.hess_lag(x, [], 1.0, lam).sparse()
         g, jacobian = problem.jac_g(x, [])
-        g, J = np.array(g).ravel(), _sparse(jacobian)
+        g, J = np.array(g).ravel(), jacobian.sparse()
         W = half + sparse.triu(half, 1).T
         free = program.lower < program.upper
         pull = np.abs(mu) / np.maximum(_distance(x, mu, program.lower, program.upper), NEAR)
@@ -160,11 +160,12 @@ class Kkt:
 
     def answer(self, change: Change) -> Vector:
         """The change (n,) of the variables that a change of the program asks for."""
-        n = len(self.free)
-        moved = _padded(np.where(self.mu[: len(change.upper)] > 0, change.upper, change.lower), n)
+        n, own = len(self.free), len(change.upper)
+        more = (0, n - own)  # the program may have proximal variables
+        moved = np.pad(np.where(self.mu[:own] > 0, change.upper, change.lower), more)
         bound = np.where(self.lam > 0, change.g_upper, change.g_lower)
         right = np.concatenate(
-            [(self.pull * moved - _padded(change.gradient, n))[self.free], bound - change.g]
+            [(self.pull * moved - np.pad(change.gradient, more))[self.free], bound - change.g]
         )
         given = self.fixed @ moved[~self.free]
         right -= np.concatenate([given[:n][self.free], given[n:]])
@@ -173,21 +174,9 @@ class Kkt:
         return dx
 
 
-def _padded(values: Vector, size: int) -> Vector:
-    """Values with zeros behind them: the program may have proximal variables."""
-    return np.concatenate([values, np.zeros(size - len(values))])
-
-
 def _distance(values: Vector, multiplier: Vector, lower: Vector, upper: Vector) -> Vector:
     """How far values are from the bound that their multiplier is about."""
     return np.asarray(np.abs(np.where(multiplier > 0, upper - values, values - lower)))
-
-
-def _sparse(matrix: ca.DM) -> Any:
-    from scipy.sparse import csc_matrix
-
-    starts, rows = matrix.sparsity().get_ccs()
-    return csc_matrix((matrix.nonzeros(), rows, starts), shape=matrix.shape)
 
 
 Problem = tuple[Task, Model]

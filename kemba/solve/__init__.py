@@ -3,8 +3,6 @@
 Imported when first asked for: who only reviews logs needs no optimiser.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

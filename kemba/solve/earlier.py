@@ -1,7 +1,5 @@
 """The plan of an earlier run as the origin of another one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from kemba.ocp import load_task, task_model

@@ -1,7 +1,5 @@
 """A plan executed on its own model and on the plant, against what its task allows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -23,6 +21,29 @@ from kemba.trajectory import Array, Trajectory
 
 STRIDES = 5  # of a periodic motion, played in a row
 OWN = ("replay", "table_replay")  # the executions on the plan's own model
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """A policy by which the plant keeps to a plan: which parts act, its arrays, the verdict on its
+    worst execution, that on the table alone, and the figures of the former."""
+
+    way: str
+    arrays: Mapping[str, Array]
+    verdict: Verdict
+    alone: Verdict
+    figures: Mapping[str, Any]
+
+    @property
+    def sentence(self) -> str:
+        """What it does, in words."""
+        done = self.verdict.sentence.removeprefix("simulated robot ")
+        with_ = f"with feedback by {self.way} (policy.npz) the simulated robot {done}"
+        return f"{with_}; by controller.csv alone {self.alone.sentence}"
+
+    def json(self) -> dict[str, Any]:
+        """The entry `feedback` of the certificate."""
+        return {"by": self.way, "alone": self.alone.sentence, **self.figures}
 
 
 @dataclass(frozen=True)
@@ -89,29 +110,6 @@ class Judged:
     def replays(self) -> bool:
         """Whether the executions on the plan's own model do."""
         return all(self.verdicts[name].good for name in OWN)
-
-
-@dataclass(frozen=True)
-class Feedback:
-    """A policy by which the plant keeps to a plan: which parts act, its arrays, the verdict on its
-    worst execution, that on the table alone, and the figures of the former."""
-
-    way: str
-    arrays: Mapping[str, Array]
-    verdict: Verdict
-    alone: Verdict
-    figures: Mapping[str, Any]
-
-    @property
-    def sentence(self) -> str:
-        """What it does, in words."""
-        done = self.verdict.sentence.removeprefix("simulated robot ")
-        with_ = f"with feedback by {self.way} (policy.npz) the simulated robot {done}"
-        return f"{with_}; by controller.csv alone {self.alone.sentence}"
-
-    def json(self) -> dict[str, Any]:
-        """The entry `feedback` of the certificate."""
-        return {"by": self.way, "alone": self.alone.sentence, **self.figures}
 
 
 def plant_of(task: Task) -> Model:

@@ -9,29 +9,24 @@ give the trial of the best score; where the plant keeps to none, the best that i
 feedback                            kemba.solve.feedback
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kemba.config import Document
 from kemba.ocp import Plan, Task
-from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import dear
 from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, plan_best, spent
+from kemba.scenarios.share import Share
 from kemba.solve.trial import Trial, TrialOrder, executed
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from kemba.scenarios.share import Share
 
 
 @dataclass(frozen=True)
@@ -68,8 +63,11 @@ def _on_ticks(old: Plan, planning: Planning) -> Plan | None:
     near, _ = planning.continued(origin)
     if near is None or near.status is not Status.SOLVED:
         return None
-    before = objective(old.model, old.task, old.requirements, old.trajectory)
-    return None if dear(near, before) else replace(near, continued=old.continued, start=old.start)
+    return (
+        None
+        if dear(near, old.objective)
+        else replace(near, continued=old.continued, start=old.start)
+    )
 
 
 UNTRIED = "the time limit came before it was executed in any scenario"

@@ -3,8 +3,6 @@
 Never needed: where the list, an entry or a run folder is gone or damaged, plans begin from guesses.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -17,7 +15,6 @@ from kemba.errors import KembaError
 from kemba.files import WriteError, atomic_text
 from kemba.model import Model
 from kemba.ocp import Plan, Task
-from kemba.ocp.certificate.certify import objective
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.task.templates import longest_leg, with_height
 from kemba.solve.earlier import origin_of
@@ -88,9 +85,8 @@ def remember(found: Plan, run: Path) -> None:
     file = list_file()
     if file is None:
         return
-    cost = objective(found.model, found.task, found.requirements, found.trajectory)
     kind, figures = kind_of(found.task, found.model), figures_of(found.task, found.model)
-    own = Remembered(kind, figures, cost, str(run.resolve()))
+    own = Remembered(kind, figures, found.objective, str(run.resolve()))
     kept = [one for one in _listed(file, lambda text: None) if one.run != own.run]
     try:
         with atomic_text(file) as stream:

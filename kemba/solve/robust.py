@@ -15,7 +15,7 @@ from kemba.ocp.certificate.asked import grip_of
 from kemba.ocp.certificate.status import Status
 from kemba.plant.equations import share_equations
 from kemba.scenarios.draw import Scenario, scenarios
-from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share, share_of
+from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share_of
 from kemba.solve.judged import judged, plant_of, table_of
 from kemba.solve.trial import Trial
 from kemba.trajectory import Trajectory
@@ -165,7 +165,7 @@ def with_share(found: Trial) -> Trial:
     if table is None:
         return found
     cases = scenarios(plan.task.uncertainties, plant_of(plan.task), plan.task.robust)
-    landed = share(plan.model, plan.trajectory, table, cases)
+    landed = share_of(outcomes(plan.model, plan.trajectory, table, cases))
     sentence = f"{found.result['sentence']}; {landed.sentence}"
     result = {**found.result, "robust": landed.summary(), "sentence": sentence}
     return replace(found, result=result)

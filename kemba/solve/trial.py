@@ -1,25 +1,20 @@
 """A trial: a plan with its controller table, executed and judged, and its score."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kemba.errors import KembaError, enumerated
 from kemba.ocp import Plan, controller_table
-from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, carried_over, lacking
 from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
+from kemba.scenarios.share import Share
 from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
-
-if TYPE_CHECKING:
-    from kemba.scenarios.share import Share
 
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
@@ -57,10 +52,8 @@ class Trial:
 
     def __str__(self) -> str:
         """One line: where it began, what was repaired, how good it is."""
-        cost = objective(
-            self.plan.model, self.plan.task, self.plan.requirements, self.plan.trajectory
-        )
-        parts = [self.plan.start, self.repair, str(self.result["status"]), f"cost {cost:.4g}"]
+        cost = f"cost {self.plan.objective:.4g}"
+        parts = [self.plan.start, self.repair, str(self.result["status"]), cost]
         if self.misses:
             parts.append(f"misses {self.misses:.2g} of what is allowed")
         return ", ".join(part for part in parts if part)
@@ -100,9 +93,8 @@ class Trial:
         """Better ones are greater: good, a plan at all, true on its own model; by what executions
         miss; by cost."""
         found = self.plan
-        cost = objective(found.model, found.task, found.requirements, found.trajectory)
         replays = self.judged is not None and self.judged.replays
-        return self.good, found.status.plan, replays, -self.misses, -cost
+        return self.good, found.status.plan, replays, -self.misses, -found.objective
 
 
 def executed(

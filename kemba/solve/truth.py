@@ -1,7 +1,5 @@
 """Whose verdict counts: the learnt model's where logs speak for it, else the simulated robot's."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any

@@ -16,6 +16,7 @@ SMALL = {
     "benchmarks/fuzz.py": ["--examples", "3"],
     "benchmarks/learning.py": ["--machines", "1", "--ways", "correction", "--record", "one.jsonl"],
     "benchmarks/plant_tables.py": ["plant", "--figures", "figures"],
+    "benchmarks/reading_logs.py": ["--minutes", "0.1", "--formats", "csv", "--repeats", "1"],
     "benchmarks/requirements.py": ["--draws", "1", "--each", "1", "--limit", "1"],
     "benchmarks/scaling.py": ["--nodes", "20", "40", "--repeats", "1"],
     "benchmarks/sensitivity.py": ["--report"],

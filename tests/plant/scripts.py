@@ -1,11 +1,14 @@
 """Motions that several tests look at: a drop, a jump-like script, a robot in the air."""
 
-from functools import cache
+from functools import cache, lru_cache
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from kemba.model import Model, load_model
 from kemba.plant.commands import Commands, Profile, Sense
+from kemba.plant.equations import equations_of
 from kemba.plant.simulate import Simulated, run
 
 FEMUR, TIBIA = 0.242, 0.234  # m
@@ -24,6 +27,19 @@ AIRBORNE = {
 @cache
 def planning() -> Model:
     return load_model("planning")
+
+
+@lru_cache(maxsize=4)
+def parts(model: Model) -> ca.Function:
+    eq = equations_of(model)
+    node = eq.node
+    return ca.Function("parts", [node.q, node.v, node.s, node.u, node.p], [*eq.parts])
+
+
+def affine(model: Model, *state: Any) -> list[np.ndarray]:
+    """M (n, n), F (n, 1), B (n, nl) and f (ns, 1) of the plant's model at a state q, v, s, u."""
+    found = parts(model)(*state, equations_of(model).values(model))
+    return [np.array(part) for part in found]
 
 
 def under_the_hips(time: float, sense: Sense) -> dict[str, float]:

@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plant.scripts import drop, jump, planning
+from plant.scripts import affine, drop, jump, planning
 
 from kemba.effects.mechanics.ground import GroundCompliance, GroundFriction
 from kemba.events import peak
 from kemba.plant.commands import Commands, Profile
-from kemba.plant.equations import equations_of
 from kemba.plant.kernel.events import CLOSED
 from kemba.plant.simulate import run, simulate
 from kemba.trajectory import Trajectory
@@ -82,7 +81,7 @@ def test_the_energy_an_impact_loses_is_what_the_motion_loses(mu: float) -> None:
     )
     v = np.zeros(len(q))
     v[:2] = 1.0, -2.0  # forward and down
-    M = equations_of(model).now(q=q, v=v, s=0.0, u=0.0)["M"]
+    M = affine(model, q, v, 0.0, 0.0)[0]
     lost = 0.5 * float(v @ M @ v - after @ M @ after)
     assert impact.lost == pytest.approx(lost, rel=1e-9) and lost > 1.0
     slip = [done.trajectory[f"{leg}/foot/vx"][0] for leg in LEGS]
@@ -112,16 +111,15 @@ def test_the_residual_holds_at_every_sample() -> None:
     """What is written satisfies the model's own residual: same physics as the other readers."""
     model, t = planning(), jump().trajectory
     node = model.node
-    eq = equations_of(model)
     for row in (5, 90, 240, 300, 480):
         q = np.array([t[c.name][row] for c in model.mechanism.coordinates])
         v = np.array([t[c.name][row] for c in model.mechanism.velocities])
         s = np.array([t[x.name][row] for x in model.states.values()])
         lam = np.array([t[x.name][row] for x in model.forces.values()])
         u = np.array([t[x.name][row] for x in model.inputs.values()])
-        E = eq.now(q=q, v=v, s=s, u=u)
-        a = np.linalg.solve(E["M"], E["F"] + E["B"] @ lam)
-        dynamics, *_ = node.residual(q, v, a, s, E["f"], lam, u, [])
+        M, F, B, f = affine(model, q, v, s, u)
+        a = np.linalg.solve(M, F.ravel() + B @ lam)
+        dynamics, *_ = node.residual(q, v, a, s, f, lam, u, [])
         assert np.abs(np.asarray(dynamics)).max() < 1e-8
         assert a[1] == pytest.approx(t["body/az"][row], abs=1e-6)
 

@@ -6,14 +6,13 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from plant.scripts import AIRBORNE, planning
+from plant.scripts import AIRBORNE, affine, planning
 
 from kemba.effects.mechanics.boom import Boom
 from kemba.mechanism import load_robot, robot_mechanism
 from kemba.mechanism.robot import build_pin_model, tree_angles
 from kemba.model import Model
 from kemba.plant.commands import Commands, Profile
-from kemba.plant.equations import equations_of
 from kemba.plant.simulate import run, simulate
 from kemba.trajectory import Trajectory
 
@@ -24,10 +23,7 @@ def states(model: Model, t: Trajectory) -> tuple[np.ndarray, np.ndarray]:
 
 
 def inertia(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    eq = equations_of(model)
-    return eq.now(q=q, v=v, s=np.zeros(eq.node.s.numel()), u=np.zeros(eq.node.u.numel()))[
-        "M"
-    ].copy()
+    return affine(model, q, v, 0.0, 0.0)[0]
 
 
 def energies(model: Model, t: Trajectory, lift: float = 0.0) -> np.ndarray:

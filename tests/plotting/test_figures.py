@@ -7,7 +7,7 @@ from matplotlib.text import Annotation
 from kemba.errors import KembaError
 from kemba.plotting import draw
 from kemba.plotting.comparison import Band, plot_bands, plot_heat_map, plot_ladder
-from kemba.plotting.motion import plot_bench, plot_force_velocity, valve_modes
+from kemba.plotting.motion import plot_bench, plot_force_velocity
 from kemba.plotting.source import Source
 from kemba.trajectory import Trajectory
 
@@ -38,13 +38,6 @@ def test_bench_and_robot_do_not_mix(plan: Source) -> None:
         draw([plan, bench("full")])
     with pytest.raises(KembaError, match="nothing to plot"):
         plot_bench([Source("odd", Trajectory(TIME, {"wind [m.s-1]": TIME}))])
-
-
-def test_modes_part_the_rows() -> None:
-    modes = valve_modes(bench("full").trajectory)
-    assert np.sum(list(modes.values()), axis=0).tolist() == [1] * 101
-    assert TIME[modes["both"]].min() == pytest.approx(0.31)
-    assert not modes["none"][25]
 
 
 def test_force_over_velocity() -> None:

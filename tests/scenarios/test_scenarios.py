@@ -10,7 +10,7 @@ from kemba.errors import KembaError
 from kemba.model import Model, load_model
 from kemba.plant.simulate import run
 from kemba.scenarios.draw import load_uncertainties, scenarios, standing
-from kemba.scenarios.share import share
+from kemba.scenarios.share import outcomes, share_of
 from kemba.trajectory import Trajectory
 
 
@@ -86,7 +86,7 @@ def standing_plan(pitch: float) -> tuple[Trajectory, Trajectory]:
 def test_a_standing_robot_keeps_standing(tmp_path: Path) -> None:
     name = written(tmp_path, "  start.body/pitch: {mean: 0 deg, sigma: 1 deg}\n")
     plan, table = standing_plan(0.0)
-    found = share(planning(), plan, table, scenarios(name, planning(), 6), 1)
+    found = share_of(outcomes(planning(), plan, table, scenarios(name, planning(), 6)))
     assert (found.n, found.landed) == (6, 6)
     assert found.summary()["wilson"] == pytest.approx([0.61, 1.0], abs=0.01)
 
@@ -95,7 +95,7 @@ def test_a_robot_that_is_laid_down_does_not(tmp_path: Path) -> None:
     """Hips at a right angle to where they stood put the body on the ground."""
     name = written(tmp_path, "  start.body/pitch: {low: 60 deg, high: 80 deg}\n")
     plan, table = standing_plan(0.0)
-    found = share(planning(), plan, table, scenarios(name, planning(), 4), 1)
+    found = share_of(outcomes(planning(), plan, table, scenarios(name, planning(), 4)))
     assert found.landed == 0
     assert "start.body/pitch" in found.worst
 

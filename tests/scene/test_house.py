@@ -118,7 +118,7 @@ def test_a_ramp_turns_the_forces_of_a_foot(effect: str) -> None:
 
 def raised_log(log: Trajectory) -> Trajectory:
     """The log as it would be on ground of 0.37 m, whose sidecar says so."""
-    meta = {**log.meta, **scene_in({"terrain": [{"height": UP}]}).json()}
+    meta = {**log.meta, **scene_in({"terrain": [{"height": UP}]}).dump()}
     return Trajectory(log.time, log.with_columns({"body/z [m]": log["body/z"] + UP}).columns, meta)
 
 

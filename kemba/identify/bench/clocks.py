@@ -56,12 +56,6 @@ def nuisance(drift: Drift | None) -> dict[str, tuple[float, float]]:
     return dict.fromkeys(moved, (0.0, ClockSettings.rate))
 
 
-def _by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
-    """A run with commands and motion as the clock of the force would have written them."""
-    moved = commands_by_one_clock(run, theta)
-    return replace(moved, motion=motion_by_one_clock(run.motion, theta))
-
-
 def commands_by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
     """A run with its commands when they were sent by the clock of the force, at theta."""
     rate, begin = theta.get(COMMANDS, 0.0), run.motion.time[0]
@@ -173,10 +167,11 @@ def without_drift(log: BenchLog, owner: str, rate: float) -> BenchLog:
     if OWNERS[owner].keys() == {COMMANDS} and not log.seen_within:
         row = float(np.median(np.diff(log.motion.time)))
         log = replace(log.sent(-0.5 * row), seen_within=row)
-    moved, time = _by_one_clock(log, _theta(owner, rate)), log.motion.time
-    gained = max(0.0, *_theta(owner, rate).values())
-    known = time <= time[0] + (time[-1] - time[0]) / (1.0 + gained)
-    return replace(moved, keep={channel: k & known for channel, k in log.keep.items()})
+    theta, time = _theta(owner, rate), log.motion.time
+    known = time <= time[0] + (time[-1] - time[0]) / (1.0 + max(0.0, *theta.values()))
+    keep = {channel: k & known for channel, k in log.keep.items()}
+    moved, motion = commands_by_one_clock(log, theta), motion_by_one_clock(log.motion, theta)
+    return replace(moved, motion=motion, keep=keep)
 
 
 def said(owner: str, rate: float, span: float) -> str:

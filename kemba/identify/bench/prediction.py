@@ -1,8 +1,6 @@
 """What a bench log should read under a model, with effects on its list and sensors as they are: the
 rig's chambers are driven by the imposed motion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import differential_evolution
 from scipy.signal import lfilter
+from scipy.stats import qmc
 
 from kemba.config import dump_yaml
 from kemba.errors import KembaError
@@ -228,8 +230,6 @@ def _spans(
 def beginnings(count: int, seed: int) -> Array:
     """Points (count, k) from which a search begins: plain courses, then points that fill the
     cube evenly."""
-    from scipy.stats import qmc
-
     settings = RigCourseSettings
     plain = np.array(list(_plain(settings.places, settings.pulses)))
     more = max(count - len(plain), 1)
@@ -264,8 +264,6 @@ def _best_point(
     `begin` (m, k): the first points that are tried. `bounded`: stop when the time is over; without
     it the answer depends on nothing but the seed.
     """
-    from scipy.optimize import differential_evolution
-
     settings, started = DesignSearchSettings, time.monotonic()
     seen: list[tuple[float, Array]] = []
 

@@ -1,7 +1,5 @@
 """The colour of the noise, learnt from what is left when every effect may help to explain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kemba.identify.infer.linear import Linear, is_on, linearise, time_blocks

@@ -1,7 +1,5 @@
 """Simple terms of a force, judged by the same evidence as the effects of the catalogue."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -16,8 +16,6 @@ motion or shorter; the widest interval counts. Errors that a repeated motion rep
 block as long as a repeat, so that one length can be blind.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass, field, replace

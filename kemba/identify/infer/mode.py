@@ -6,8 +6,6 @@ residual at its own values, would gain from this difference alone, and an effect
 on a machine that has a little of many. So every hypothesis is judged by the residual at its mode.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 """The problem linearised at refitted hypotheses, the model as it is first: its fit, the colour of
 the noise, and the linear evidence of every effect."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 

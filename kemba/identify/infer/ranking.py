@@ -1,7 +1,5 @@
 """The effects in order of probability, with their parameters and their equivalents."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 

@@ -2,8 +2,6 @@
 Marquardt's steps. Slopes along nuisance parameters are those of the null, but for those that are
 `curved`, so that only the few columns of an effect are new in a step."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

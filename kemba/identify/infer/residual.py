@@ -1,8 +1,6 @@
 """What an answer leaves: error that repeats itself, parameters that differ between runs, patterns
 of force; and what to measure next."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The search: fit of the null, ranking, refits of the leaders, further effects one by one."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Is anything missing at all? What the best effect gains, and what chance would."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -76,13 +74,7 @@ class NullTest:
         return float(max(np.quantile(self.scores, 1.0 - settings.rare), settings.least))
 
 
-def bootstrap(
-    ranker: Ranker,
-    noise: Array,
-    hypotheses: Sequence[Hypothesis],
-    seed: int = 0,
-    draws: int | None = None,
-) -> NullTest:
+def bootstrap(ranker: Ranker, noise: Array, hypotheses: Sequence[Hypothesis]) -> NullTest:
     """Scores of simulated logs in which nothing is missing.
 
     In each of them the nominal figures are off within their tolerance, every effect is there with
@@ -90,19 +82,17 @@ def bootstrap(
     k): J'e of short blocks of the error of a flexible model. A block keeps the colour of the
     noise; a random sign of each block makes new noise.
     """
-    draws = BootstrapSettings.draws if draws is None else draws
-    rng = np.random.default_rng(seed)
-    slopes = _slopes(ranker, noise, rng, draws)
+    slopes = _slopes(ranker, noise)
     base = _evidence(ranker, (), slopes)
-    best = np.full(draws, -np.inf)
+    best = np.full(slopes.shape[1], -np.inf)
     for hypothesis in hypotheses:
         best = np.maximum(best, _evidence(ranker, hypothesis, slopes) - base)
     return NullTest(best, ranker.linear.names, len(noise))
 
 
-def _slopes(ranker: Ranker, noise: Array, rng: np.random.Generator, draws: int) -> Array:
+def _slopes(ranker: Ranker, noise: Array) -> Array:
     """J'r (k, draws) of logs in which nothing is missing, at the prior mean."""
-    linear = ranker.linear
+    linear, draws, rng = ranker.linear, BootstrapSettings.draws, np.random.default_rng(0)
     signs = rng.choice([-1.0, 1.0], size=(draws, len(noise)))
     tolerance = rng.choice(SpikeSlabSettings.tolerances, size=draws)
     truth = rng.standard_normal((draws, len(linear.width))) * ranker.widths((), 1.0)

@@ -1,8 +1,6 @@
 """Evidence for "these effects are large and all others are small", by linear algebra."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from math import comb
 
@@ -13,61 +11,6 @@ from scipy.special import log_ndtr, logsumexp
 from kemba.identify.infer.linear import Linear, precision_factor
 from kemba.identify.infer.windows import START
 from kemba.identify.problem.types import Array, Candidate, Labels
-
-
-@dataclass(frozen=True)
-class Neighbours:
-    """A Gaussian problem with prior widths (k,), solved once.
-
-    `covariance` (k, k) and `step` (k,): posterior; `eta` . `step`, `quadratic` and `log_det` as the
-    evidence of the base hypothesis needs them. `shift` (k,): prior mean minus the point.
-    """
-
-    width: Array
-    shift: Array
-    covariance: Array
-    step: Array
-    fitted: float
-    quadratic: float
-    log_det: float
-
-    @classmethod
-    def of(cls, gram: Array, slope: Array, power: float, shift: Array, width: Array) -> Neighbours:
-        """The problem of `Linear` sums under the prior `width` (k,)."""
-        eta = shift / width**2 - slope
-        lower = precision_factor(gram, width)
-        root = np.linalg.solve(lower, np.diag(width))
-        covariance = root.T @ root
-        step = covariance @ eta
-        quadratic = power + float(np.sum((shift / width) ** 2))
-        log_det = 2.0 * float(np.sum(np.log(np.diag(lower))))
-        return cls(width, shift, covariance, step, float(eta @ step), quadratic, log_det)
-
-    def with_widths(
-        self, changed: Sequence[int], width: Array, wanted: Labels
-    ) -> tuple[float, Array, Array]:
-        """Log evidence where the parameters `changed` have the prior `width` instead; their steps
-        and those of the others in `wanted` (m,), and 1 sigma (m,) of these.
-
-        Sherman, Morrison and Woodbury: only matrices of the size of `changed` are inverted.
-        """
-        i, j = np.asarray(changed, dtype=int), wanted
-        old = self.width[i]
-        delta = 1.0 / width**2 - 1.0 / old**2
-        push = delta * self.shift[i]
-        C = self.covariance[np.ix_(i, i)]
-        D = self.covariance[np.ix_(j, i)]
-        inner = np.eye(len(i)) + C * delta
-        mixed = np.linalg.solve(inner.T, np.diag(delta)).T
-        y = self.step[i] + C @ push
-        fitted = self.fitted + 2.0 * float(push @ self.step[i]) + float(push @ C @ push)
-        fitted -= float(y @ mixed @ y)
-        quadratic = self.quadratic + float(np.sum(delta * self.shift[i] ** 2)) - fitted
-        log_det = self.log_det + float(np.log(np.linalg.det(inner)))
-        log_det += 2.0 * float(np.sum(np.log(width / old)))
-        step = self.step[j] + D @ push - D @ mixed @ y
-        variance = self.covariance[j, j] - np.einsum("ab,bc,ac->a", D, mixed, D)
-        return -0.5 * (quadratic + log_det), step, np.sqrt(np.maximum(variance, 0.0))
 
 
 class SpikeSlabSettings:
@@ -179,23 +122,44 @@ class Ranker:
         keys = (tuple(sorted((*given, other))) for other in others)
         return dict(zip(keys, total.tolist(), strict=True))
 
-    def _beside(self, given: Hypothesis, others: list[str], tolerance: float) -> list[float]:
-        """Log evidence of `given` with each of the `others`, from one factor."""
-        linear, base = self.linear, self.widths(given, tolerance)
-        wide = self.widths(tuple(self.candidates), tolerance)
+    def _beside(self, given: Hypothesis, others: list[str], tolerance: float) -> Array:
+        """Log evidence (o,) of `given` with each of the `others`, from one factor: only the prior
+        width of one parameter differs then (Sherman and Morrison)."""
+        linear = self.linear
+        width, wide = (self.widths(h, tolerance) for h in (given, tuple(self.candidates)))
         shift = linear.mean - linear.at
-        near = Neighbours.of(self._gram, self._slope, self._power, shift, base)
-        found = []
-        for other in others:
-            names, i = [*given, other], [self.lead[other]]
-            j = [self.lead[e] for e in names]
-            evidence, step, sd = near.with_widths(i, wide[i], np.array(j, dtype=int))
-            for a, lead in enumerate(self.candidates[e].lead for e in names):
-                if not lead.signed:
-                    z = linear.at[j[a]] + step[a] - lead.off
-                    evidence += float(np.log(2.0) + log_ndtr(z / sd[a]))
-            found.append(evidence)
-        return found
+        eta = shift / width**2 - self._slope
+        lower = precision_factor(self._gram, width)
+        root = np.linalg.solve(lower, np.diag(width))
+        covariance = root.T @ root
+        step = covariance @ eta
+        i = np.array([self.lead[e] for e in others], dtype=int)
+        delta = wide[i] ** -2.0 - width[i] ** -2.0
+        push, variance = delta * shift[i], covariance[i, i]
+        share = delta / (1.0 + variance * delta)
+        moved = step[i] + variance * push
+        fitted = eta @ step + push * (2.0 * step[i] + push * variance) - share * moved**2
+        quadratic = self._power + np.sum((shift / width) ** 2) + delta * shift[i] ** 2 - fitted
+        log_det = 2.0 * np.sum(np.log(np.diag(lower))) + np.log1p(variance * delta)
+        evidence = -0.5 * (quadratic + log_det) - np.log(wide[i] / width[i])
+        for effects in ([e] * len(others) for e in given):
+            evidence += self._sides(effects, covariance, step, i, push - share * moved, share)
+        return np.asarray(
+            evidence + self._sides(others, covariance, step, i, push - share * moved, share)
+        )
+
+    def _sides(
+        self, effects: list[str], covariance: Array, step: Array, i: Labels, by: Array, share: Array
+    ) -> Array:
+        """As `_sign_term` (o,) for one effect each, where the parameter `i` (o,) has another width:
+        a step goes further `by` (o,) times its covariance with it, a variance falls by `share`
+        (o,) times its square."""
+        leads = [self.candidates[e].lead for e in effects]
+        j = np.array([self.lead[e] for e in effects], dtype=int)
+        along = covariance[j, i]
+        sd = np.sqrt(np.maximum(covariance[j, j] - share * along**2, 0.0))
+        z = self.linear.at[j] + step[j] + along * by - [lead.off for lead in leads]
+        return np.where([lead.signed for lead in leads], 0.0, np.log(2.0) + log_ndtr(z / sd))
 
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:

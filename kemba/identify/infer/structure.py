@@ -7,8 +7,6 @@ values leads anywhere: the fit of the figures goes by bounded steps that are tak
 innovations become likelier, and the motion is found again in between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

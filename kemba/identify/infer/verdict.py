@@ -1,7 +1,5 @@
 """What may be said of a finished search: why its answer is not complete, and the verdict."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from kemba.errors import enumerated

@@ -3,8 +3,6 @@
 The error of a wrong model lasts longer than one row; noise changes from row to row.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any

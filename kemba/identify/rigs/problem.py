@@ -39,11 +39,6 @@ from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
 
-def possible_candidates(model: Model, logs: Sequence[RigLog]) -> dict[str, Candidate]:
-    """Effects and sensor faults by name, sized as the catalogue has them."""
-    return standing_candidates(model) | sensor_candidates(_sensor_sigmas(model, logs), model)
-
-
 def standing_candidates(model: Model) -> dict[str, Candidate]:
     """Effects by name that the model of the rig can have."""
     return {n: c for n, c in effect_candidates(model).items() if stands(model, n)}
@@ -219,7 +214,8 @@ class RigProblem(ColouredProblem):
     ) -> None:
         self.model, self.logs = model, tuple(logs)
         self.runs = tuple(log.name for log in self.logs)
-        possible = possible_candidates(model, self.logs)
+        sigmas = _sensor_sigmas(model, self.logs)
+        possible = standing_candidates(model) | sensor_candidates(sigmas, model)
         predictor = Predictor(model, possible)
         predictor.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
         self.candidates = sized(predictor, self.logs, possible)

@@ -1,7 +1,5 @@
 """What robot logs can tell of: the catalogue's effects, put so that a switch can be linearised."""
 
-from __future__ import annotations
-
 from kemba.identify.problem.candidates import (
     CandidateSettings,
     by_default,

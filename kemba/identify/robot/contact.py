@@ -1,7 +1,5 @@
 """Contacts of feet and end stops, read from the measured motion and never from a plan."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

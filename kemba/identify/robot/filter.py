@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,24 @@ class System:
     R: Array
     P0: Array
     lags: int = 0
+
+    def with_lags(self, keep: Array, size: Array) -> System:
+        """The system with k lags of white noise as more states, which no row reads as yet.
+
+        `keep` (n, L, k) or (n, L, 1): the share of a lag that a step keeps; `size` (L, k) or (k,):
+        its 1 sigma.
+        """
+        k, d, j = size.shape[-1], self.F.shape[-1], self.G.shape[-1]
+        F, G, W, P0 = (
+            np.pad(a, [(0, 0)] * (a.ndim - 2) + [(0, k)] * 2)
+            for a in (self.F, self.G, self.W, self.P0)
+        )
+        i = np.arange(k)
+        F[..., d + i, d + i], G[..., d + i, j + i] = keep, 1.0
+        W[..., j + i, j + i] = (1.0 - keep**2) * size**2
+        P0[:, d + i, d + i] = size**2
+        H = np.pad(self.H, [(0, 0)] * 3 + [(0, k)])
+        return replace(self, F=F, G=G, W=W, H=H, P0=P0, lags=self.lags + k)
 
 
 @dataclass(frozen=True)

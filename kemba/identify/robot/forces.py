@@ -6,8 +6,6 @@ strength is learnt from the data; a channel that needs no force ends with almost
 the contact forces are unknown too, so only the force that they cannot explain is found.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -330,26 +328,8 @@ def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System
     `density` (n, L, c): of the other unknown forces.
     """
     base = state.motion.system_with(density, state.batch.h)
-    h, k = state.batch.h, len(sigma)
-    n, runs, m, d = base.H.shape
-    pushes = state.motion.channels[..., :k]  # generalised force per channel force
-    F = np.zeros((n, runs, d + k, d + k))
-    F[..., :d, :d] = base.F
-    accelerations = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
-    F[..., :d, d:] = accelerations
-    keep = np.exp(-h / MEMORY)
-    i = np.arange(k)
-    F[..., d + i, d + i] = np.where(state.batch.valid, keep, 1.0)[..., None]
-    j = base.G.shape[3]
-    G = np.zeros((n, runs, d + k, j + k))
-    G[..., :d, :j] = base.G
-    G[..., d + i, j + i] = 1.0
-    W = np.zeros((n, runs, j + k, j + k))
-    W[..., :j, :j] = base.W
-    W[..., j + i, j + i] = (1.0 - keep**2)[..., None] * sigma**2
-    H = np.zeros((n, runs, m, d + k))
-    H[..., :d] = base.H
-    P0 = np.zeros((runs, d + k, d + k))
-    P0[:, :d, :d] = base.P0
-    P0[:, d + i, d + i] = sigma**2
-    return System(F, G, W, H, base.R, P0)
+    keep = np.where(state.batch.valid, np.exp(-state.batch.h / MEMORY), 1.0)
+    found, d = base.with_lags(keep[..., None], sigma), base.F.shape[-1]
+    pushes = state.motion.channels[..., : len(sigma)]  # generalised force per channel force
+    found.F[..., :d, d:] = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
+    return found

@@ -7,8 +7,6 @@ learnt from the filter's errors, missing forces are kinds of noise, too, so that
 is not taken for the noise of a sensor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -40,24 +38,14 @@ def coloured(system: System, noise: Noise, sigma: Array, h: Array) -> System:
     if all(channel == ChannelNoise() for channel in noise):
         return system
     lags = [(i, s, memory) for i, c in enumerate(noise) for s, memory in c.lags]
-    n, runs, m, d = system.H.shape
-    more, j = len(lags), system.G.shape[-1]
     channel = np.array([i for i, _, _ in lags], dtype=int)
     size = sigma[:, channel] * np.array([s for _, s, _ in lags])  # (L, lags)
     keep = np.exp(-h[..., None] / np.array([memory for _, _, memory in lags]))
-    at = np.arange(more)
-    F, G = np.zeros((n, runs, d + more, d + more)), np.zeros((n, runs, d + more, j + more))
-    W, H = np.zeros((n, runs, j + more, j + more)), np.zeros((n, runs, m, d + more))
-    P0 = np.zeros((runs, d + more, d + more))
-    F[..., :d, :d], G[..., :d, :j], W[..., :j, :j] = system.F, system.G, system.W
-    H[..., :d], P0[:, :d, :d] = system.H, system.P0
-    F[..., d + at, d + at], G[..., d + at, j + at] = keep, 1.0
-    W[..., j + at, j + at] = (1.0 - keep**2) * size**2
-    H[..., channel, d + at] = 1.0
-    P0[:, d + at, d + at] = size**2
+    found = system.with_lags(keep, size)
+    found.H[..., channel, np.arange(-len(lags), 0)] = 1.0
     R = system.R.copy()
     R[..., : len(noise)] *= np.array([c.white for c in noise]) ** 2
-    return replace(system, F=F, G=G, W=W, H=H, R=R, P0=P0, lags=more)
+    return replace(found, R=R)
 
 
 def simulated(system: System, draws: int, rng: np.random.Generator) -> Array:

@@ -1,7 +1,5 @@
 """Numeric functions of a robot model along measured motion, mapped over many samples at once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any

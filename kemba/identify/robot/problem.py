@@ -1,7 +1,5 @@
 """Robot logs under one model as whitened residuals: the innovations of a filter around the data."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -10,6 +8,7 @@ import numpy as np
 from typing_extensions import Self
 
 from kemba.errors import KembaError
+from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import sensor_candidates
 from kemba.identify.problem.problem import Problem, mean_slope
@@ -53,7 +52,7 @@ from kemba.identify.robot.noise import (
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
 from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
-from kemba.identify.robot.validate import contradictions, mixed_commands, rms, slightly_mixed_up
+from kemba.identify.robot.validate import contradictions, mixed_commands, slightly_mixed_up
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 

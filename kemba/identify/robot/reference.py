@@ -1,7 +1,5 @@
 """The reference: the motion along which a model is linearised, and how it is first found."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

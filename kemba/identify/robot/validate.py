@@ -4,14 +4,13 @@ What a command does shows in the motion only: each mistake about commands is jud
 residual of the whole log along the same measured motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
+from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array, Flags, Rows
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.mix_ups import SAME, command_mix_ups, corrected
@@ -51,10 +50,6 @@ def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaErro
     """Mistakes that move feet by millimetres, where no lengths make them stand as well."""
     what = "corrected, feet stand on level ground; else legs of other lengths would be needed"
     return KembaError(", ".join(runs), "; or ".join(mistakes), what, HINT)
-
-
-def rms(r: Array) -> float:
-    return float(np.sqrt(np.mean(r**2)))
 
 
 # When robot logs contradict themselves or any model.
@@ -114,7 +109,7 @@ def _power(channels: Sequence[str], r: Array, rows: Rows, own: Flags) -> dict[st
     for k, channel in enumerate(channels):
         at = own & (rows.channel == k)
         if at.any():
-            found[channel] = float(np.sqrt(np.mean(r[at] ** 2)))
+            found[channel] = rms(r[at])
     return found
 
 

@@ -1,7 +1,5 @@
 """Bags of ROS 2: a folder with its files, or one SQLite file of them."""
 
-from __future__ import annotations
-
 import sqlite3
 from contextlib import closing
 from dataclasses import replace

@@ -27,8 +27,8 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.refinement.refine import Refined, Refiner, reduction_of, refine, valve_columns
-from kemba.ocp.refinement.start import certificate, on_elements, solve, to_trajectory, warm
+from kemba.ocp.refinement.refine import Refined, Refiner, read, reduction_of, refine, valve_columns
+from kemba.ocp.refinement.start import on_elements, solve, warm
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -163,7 +163,7 @@ class Continuation:
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)
-        return _ended(program, found)
+        return read(program, found)
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")
@@ -172,18 +172,6 @@ class Continuation:
         )
         self.steps.append(Attempt("phases read anew", found.ending, found.iterations))
         return found
-
-
-def _ended(program: PhaseProgram, found: Iterate) -> Refined:
-    """A solved program as a plan with what it violates; without them where it is not solved."""
-    assert found.ending is not None
-    phases = tuple(program.phases)
-    if not found.solved:
-        return Refined(None, None, found.ending, found.iterations, phases)
-    trajectory = to_trajectory(program, found.Y)
-    measured = certificate(program, found.Y, trajectory)
-    own = Stages.of(program, found)
-    return Refined(trajectory, measured, found.ending, found.iterations, phases, stages=own)
 
 
 def with_impacts(program: PhaseProgram, x: np.ndarray, ease: float) -> np.ndarray:

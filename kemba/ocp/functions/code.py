@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -75,11 +76,9 @@ class _Canonical:
 
     def _sum(self, one: Signed, other: Signed, minus: bool) -> Signed:
         """+-a +- b as +-(a +- b), the older operand first."""
-        (negative, a), (sign, b) = sorted((one, (other[0] != minus, other[1])), key=self._second)
+        both = one, (other[0] != minus, other[1])
+        (negative, a), (sign, b) = sorted(both, key=lambda x: self._age(x[1]))
         return self._made(negative, ca.OP_SUB if sign != negative else ca.OP_ADD, a, b)
-
-    def _second(self, x: Signed) -> int:
-        return self._age(x[1])
 
     def _age(self, x: ca.SX) -> int:
         return self.order.setdefault(x.element_hash(), (len(self.order), x))[0]
@@ -87,8 +86,7 @@ class _Canonical:
     def _made(self, negative: bool, kind: int, *values: ca.SX) -> Signed:
         key = (kind, *map(self._age, values))
         if key not in self.known:
-            make = ca.SX.unary if len(values) == 1 else ca.SX.binary
-            self.known[key] = make(kind, *values)
+            self.known[key] = _applied(kind, *values)
         value = self.known[key]
         if value.is_op(ca.OP_NEG):
             return not negative, value.dep(0)
@@ -97,6 +95,12 @@ class _Canonical:
 
 def _plain(x: Signed) -> ca.SX:
     return -x[1] if x[0] else x[1]
+
+
+def _applied(kind: int, *operands: Any) -> Any:
+    """The result of CasADi's operation `kind` on operands that are all SX, or all MX."""
+    of = type(operands[0])
+    return of.unary(kind, *operands) if len(operands) == 1 else of.binary(kind, *operands)
 
 
 FEW = 8  # points at which evaluating one by one is as fast as all at once
@@ -219,10 +223,7 @@ def parameterised(
             return ca.SX(value)
         return symbols.setdefault(value, ca.SX.sym(f"c{len(symbols)}"))
 
-    def apply(kind: int, *operands: ca.SX) -> ca.SX:
-        return (ca.SX.unary if len(operands) == 1 else ca.SX.binary)(kind, *operands)
-
-    found = replay(f, given, number, apply)
+    found = replay(f, given, number, _applied)
     results = [ca.SX.zeros(f.sparsity_out(i)) for i in range(f.n_out())]
     for result, nonzeros in zip(results, found, strict=True):
         result.nz[:] = ca.vertcat(*nonzeros)
@@ -238,15 +239,9 @@ def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.
     inputs = [ca.MX.sym(f.name_in(i), f.numel_in(i), w) for i, w in enumerate(widths)]
     with _as_written():
         rows = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
-        outputs = replay(f, [[row.T for row in group] for group in rows], ca.MX, _apply)
+        outputs = replay(f, [[row.T for row in group] for group in rows], ca.MX, _applied)
         stacked = [_stacked(found, points) for found in outputs]
         return ca.Function(f.name(), inputs, stacked, {"never_inline": True})
-
-
-def _apply(kind: int, *operands: ca.MX) -> ca.MX:
-    if len(operands) == 1:
-        return ca.MX.unary(kind, operands[0])
-    return ca.MX.binary(kind, operands[0], operands[1])
 
 
 def _stacked(elements: list[ca.MX], points: int) -> ca.MX:

@@ -1,9 +1,8 @@
 """What prevents a plan: a sentence, the requirement to relax, and how certain it is."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 from kemba.config import Document
 from kemba.config.document import Location, written
@@ -98,11 +97,6 @@ def one_per_requirement(relaxed: Iterable[Relax]) -> tuple[Relax, ...]:
         if abs(r.asked - r.reachable) > abs(known.asked - known.reachable):
             worst[(r.requirement, r.asked > r.reachable)] = r
     return tuple(worst.values())
-
-
-def among(requirements: Sequence[Requirement], pattern: str, at: float | None) -> list[Requirement]:
-    """The requirements on quantities like `pattern` at a moment."""
-    return [w for w in requirements if w.at == at and fnmatchcase(w.quantity.name, pattern)]
 
 
 def spoken(location: Location) -> str:

@@ -18,7 +18,7 @@ from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
 from kemba.ocp.task.costs import scaled
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Landing, Task
-from kemba.ocp.transcription.stage import StageRows
+from kemba.ocp.transcription.stage import requirement_row
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.transcribe import Parameters, RequirementBlock, Transcription
 
@@ -88,15 +88,7 @@ class Elastic(Transcription):
         self.slack.append((requirement, column, scale))
         self.upper[0, column : column + 2] = np.inf
         below, above = ca.SX.sym("below"), ca.SX.sym("above")
-        rows = StageRows(
-            "requirement",
-            g / scale + below - above,
-            requirement.lower / scale,
-            requirement.upper / scale,
-            (requirement.label,),
-            (requirement.quantity.unit,),
-            (scale,),
-        )
+        rows = replace(requirement_row(g, requirement), g=g / scale + below - above)
         shared = np.tile(index[0, column : column + 2], (len(where), 1))
         z, _, _, at = self.local(requirement, rows.g, where, index)
         price = PRICE * (below + above) / len(where)

@@ -85,10 +85,8 @@ def descending(
 
     _, gradient = program.problem.grad_f(x, program.p)
     values, jacobian = program.problem.jac_g(x, program.p)
-    pattern, shape = jacobian.sparsity(), (program.problem.rows, program.size)
-    rows = csc_matrix((jacobian.nonzeros(), pattern.row(), pattern.colind()), shape=shape)
     inside, n, ties = program.problem.rows - program.pairs, program.size, np.flatnonzero(zero)
-    rows = rows[:inside]  # products are left out: sides say them
+    rows = jacobian.sparse()[:inside]  # products are left out: sides say them
     at = np.concatenate([x, np.array(values).ravel()[:inside]])
     wide = program.relaxed(np.inf)
     low = np.concatenate([wide.lower, wide.g_lower[:inside]]) - at

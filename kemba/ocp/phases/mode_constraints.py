@@ -344,11 +344,9 @@ def _put(
     columns = [_columns(program, node, full=variable is None) for node in nodes]
     if variable is not None:
         index, factor, offset = variable
-        ends = sorted(
-            ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
-        )
         at = [z[index] for z in columns]
-        tighter = tighter_bounds(program.lower[at], program.upper[at], ends)
+        bounds = program.lower[at], program.upper[at]
+        tighter = tighter_bounds(*bounds, factor, offset, requirement)
         if tighter is None:
             raise ContradictionError(f"other bounds exclude `{requirement.text}`")
         program.lower[at], program.upper[at] = tighter

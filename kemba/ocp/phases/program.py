@@ -360,17 +360,9 @@ class View:
     """The node's expressions as functions of scaled half symbols q, v, s, u, lam."""
 
     def __init__(self, program: PhaseProgram) -> None:
-        self.layout, self.node = program.layout, program.model.node
-        groups = ("q", "v", "s", "u", "lam")
-        self.symbols = {g: scaled(self.layout, g, g) for g in groups}
-        y = node_vector(self.layout, self.symbols)
-        self._full = [ca.densify(self.layout.full(y, g)) for g in groups]
-
-    def of(self, expression: ca.SX) -> ca.SX:
-        """An expression of the node's symbols in the half ones."""
-        node = self.node
-        symbols = [node.q, node.v, node.s, node.u, node.lam]
-        return ca.SX(ca.cse(ca.densify(ca.substitute([ca.SX(expression)], symbols, self._full)[0])))
+        self.layout = program.layout
+        self.symbols = {g: scaled(self.layout, g, g) for g in ("q", "v", "s", "u", "lam")}
+        self.of = self.layout.reader(program.model.node, node_vector(self.layout, self.symbols))
 
     def z(self, groups: str) -> ca.SX:
         """The symbols of some groups as one vector; `groups` such as "q v"."""

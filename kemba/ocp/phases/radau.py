@@ -11,7 +11,7 @@ from kemba.model import Model
 from kemba.ocp.task.costs import running
 from kemba.ocp.task.task import CostTerm
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
-from kemba.ocp.transcription.stage import ANGLE_ARM, COST_SCALE
+from kemba.ocp.transcription.stage import COST_SCALE, project
 from kemba.ocp.transcription.symmetry import Reduction
 
 STATE = ("q", "v", "s")
@@ -157,13 +157,3 @@ def impact(model: Model, layout: Layout, reduction: Reduction) -> Jump:
     g = dynamics(change, lam) - dynamics(rest, ca.SX.zeros(lam.numel()))
     labels = tuple(f"impact:{c.name}" for c in layout.quantities["q"])
     return Jump(ca.vertcat(*x.values(), after, impulse), project(model, reduction, g), labels)
-
-
-def project(model: Model, reduction: Reduction, dynamics: ca.SX) -> ca.SX:
-    """Scaled equations of motion (half n,) [1] of the half robot, by virtual work.
-
-    `dynamics` (n,): the equations of the whole robot [N or N.m].
-    """
-    scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in model.node.dynamics_rows]
-    B = ca.sparsify(ca.DM(reduction.B["q"]))
-    return ca.mtimes(B.T, dynamics / ca.DM(scale))

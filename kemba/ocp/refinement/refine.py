@@ -169,7 +169,7 @@ class Refiner:
         best = with_pulses(self.solution, lambda p: self.build(p, start, RADAU5)[0], self.control)
         if best is self.solution:
             return found
-        made = self.read(*best)
+        made = read(*best)
         kept = made.certificate is not None and made.certificate.within(self.task.tolerances)
         return replace(made, plain=found) if kept else found
 
@@ -185,7 +185,7 @@ class Refiner:
             self.tell("phases: changing the order of contacts and valves")
             for step in (NEAREST, BEST, FINEST):
                 program, near = self.elastic(phases, start, step)
-                start, found = (program, near.Y), self._ended(program, near)
+                start, found = (program, near.Y), ended(program, near)
                 if not near.solved:
                     return found
                 wrong = misfits(program, near.Y)
@@ -221,7 +221,7 @@ class Refiner:
         options = rough(settings.rough_iterations)
         found = self._solve(program, program.proximal(x, settings.near), options)
         if not found.solved:
-            return self._ended(program, found)
+            return ended(program, found)
         return self.simpler(program, found.Y) or self.finish(program, found.Y)
 
     def simpler(self, program: PhaseProgram, x: np.ndarray) -> Refined | None:
@@ -239,7 +239,7 @@ class Refiner:
         self.tell(Stage("phases: the best plan", 2, SOLVES))
         program, start = self.build(near.phases, self.plan, RADAU3)
         best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
-        found = self._ended(program, best)
+        found = ended(program, best)
         if best.solved:
             simpler = self.simpler(program, best.Y)
             if simpler is not None:
@@ -258,18 +258,9 @@ class Refiner:
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
         start = carried(program, coarser.columns, coarser.scheme.points, x)
         found = self._solve(program, start, warm(settings.rough_iterations))
-        if not found.solved:
-            return self._ended(program, found)
-        self.solution = program, found
-        return self.read(program, found)
-
-    def read(self, program: PhaseProgram, solution: Iterate) -> Refined:
-        """A solved program as a plan."""
-        trajectory = to_trajectory(program, solution.Y)
-        measured = certificate(program, solution.Y, trajectory)
-        own = Stages.of(program, solution)
-        ended = self._ended(program, solution)
-        return replace(ended, trajectory=trajectory, certificate=measured, stages=own)
+        if found.solved:
+            self.solution = program, found
+        return read(program, found)
 
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
@@ -301,9 +292,21 @@ class Refiner:
         self.iterations += found.iterations
         return found
 
-    def _ended(self, program: PhaseProgram, last: Iterate) -> Refined:
-        assert last.ending is not None
-        return Refined(None, None, last.ending, self.iterations, tuple(program.phases))
+
+def ended(program: PhaseProgram, last: Iterate) -> Refined:
+    """How a solve of a program ended, without a plan."""
+    assert last.ending is not None
+    return Refined(None, None, last.ending, last.iterations, tuple(program.phases))
+
+
+def read(program: PhaseProgram, last: Iterate) -> Refined:
+    """What a solve of a program gave: a plan where it is solved."""
+    found = ended(program, last)
+    if not last.solved:
+        return found
+    trajectory = to_trajectory(program, last.Y)
+    measured, own = certificate(program, last.Y, trajectory), Stages.of(program, last)
+    return replace(found, trajectory=trajectory, certificate=measured, stages=own)
 
 
 def order_of(

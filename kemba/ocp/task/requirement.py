@@ -12,8 +12,8 @@ import casadi as ca
 from kemba.config.document import Location, written
 from kemba.model import Model
 from kemba.ocp.task.expressions import is_expression, symbolic
-from kemba.ocp.task.terrain import heights_above
 from kemba.quantity import Quantity
+from kemba.scene import POINTS
 
 # How much of each unit matters in a requirement; other units have the scale of the quantity.
 SCALES = {"m": 0.1, "rad": 0.2, "m.s-1": 1.0, "rad.s-1": 5.0}
@@ -110,7 +110,9 @@ def quantities(model: Model) -> dict[str, Quantity]:
     groups = (model.states, model.inputs, model.forces)
     named = [q for group in groups for q in group.values()]
     known = {q.name: q for q in (*ports, *own, *named)}
-    return {**heights_above(model, known), **known}
+    points = [f"{leg}/{point}" for leg in mechanism.legs for point in POINTS]
+    # heights above the ground, where these are heights above 0
+    return {**{f"{p}/gap": known[f"{p}/z"] for p in points if f"{p}/z" in known}, **known}
 
 
 def quantity_expression(model: Model, name: str) -> ca.SX:

@@ -4,8 +4,6 @@ Names of costs and of IPOPT's options, and figures that no solve could meet, are
 anything is built.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,7 +13,7 @@ from fnmatch import fnmatchcase
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
@@ -31,10 +29,6 @@ from kemba.ocp.task.task import Bound, CostTerm, Goal, Moment, Task
 from kemba.ocp.task.templates import TEMPLATES, with_height
 from kemba.ocp.task.terrain import rooms, scene_errors
 from kemba.quantity import Quantity, to_si
-
-if TYPE_CHECKING:
-    from kemba.ocp.task.task import Task
-
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
 SPECIAL = ("rest", "settled")

@@ -283,7 +283,7 @@ class Task(Section):
     @property
     def scene(self) -> Scene:
         """The ground and its obstacles."""
-        return Scene(self.terrain or (), self.obstacles or ())
+        return Scene(terrain=self.terrain or (), obstacles=self.obstacles or ())
 
     @property
     def place_x(self) -> float:

@@ -1,36 +1,16 @@
 """What the scene of a task means for its requirements: names, lines that cannot be, ground."""
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
 
 from kemba.config import Document
 from kemba.config.document import written
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.quantity import Quantity
-from kemba.scene import POINTS
 
 STANDS = 1e-6  # m; a foot that is asked to be lower than this above the ground stands
-
-
-class AskedOf(Protocol):
-    """What is asked of a requirement here."""
-
-    @property
-    def quantity(self) -> Quantity: ...
-    @property
-    def at(self) -> float | None: ...
-    @property
-    def lower(self) -> float: ...
-    @property
-    def upper(self) -> float: ...
-
-
-def heights_above(model: Model, known: dict[str, Quantity]) -> dict[str, Quantity]:
-    """Names of heights above the ground where these are heights above 0: `front/foot/gap`."""
-    points = [f"{leg}/{point}" for leg in model.mechanism.legs for point in POINTS]
-    return {f"{p}/gap": known[f"{p}/z"] for p in points if f"{p}/z" in known}
 
 
 def scene_errors(task: Task, document: Document) -> list[KembaError]:
@@ -48,7 +28,7 @@ def rooms(model: Model, known: dict[str, Quantity]) -> Iterator[tuple[int, Quant
                 yield i, quantity
 
 
-def ground_at(model: Model, requirements: Sequence[AskedOf], at: float) -> float:
+def ground_at(model: Model, requirements: Sequence[Requirement], at: float) -> float:
     """Height [m] of the ground under the body where it is asked to be at a moment, else at the
     start, else at x = 0."""
     places = [r for r in requirements if r.quantity.name == "body/x" and r.lower == r.upper]
@@ -56,7 +36,7 @@ def ground_at(model: Model, requirements: Sequence[AskedOf], at: float) -> float
     return float(model.mechanism.scene.ground.height(here[0] if here else 0.0))
 
 
-def stands(model: Model, requirement: AskedOf) -> bool:
+def stands(model: Model, requirement: Requirement) -> bool:
     """Whether it asks for a foot that stands on the ground."""
     place, _, what = requirement.quantity.name.rpartition("/")
     level = model.mechanism.scene.ground.level

@@ -1,12 +1,13 @@
 """What a node's vector holds: q, v, s, u, lam, h, scaled, possibly of half a robot."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.model.model import Node
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.quantity import Quantity
 
@@ -74,6 +75,18 @@ class Layout:
         if isinstance(y, ca.SX):
             return ca.mtimes(ca.sparsify(ca.DM(self._matrix(group))), self.half(y, group)) + zero
         return self.half(y, group) @ self._matrix(group).T + zero
+
+    def reader(self, node: Node, y: ca.SX) -> Callable[[ca.SX], ca.SX]:
+        """What turns expressions of the whole robot's q, v, s, u and lam into ones of a vector
+        `y` (size,) of scaled half coordinates."""
+        symbols = [getattr(node, g) for g in GROUPS if g != "h"]
+        full = [ca.densify(self.full(y, g)) for g in GROUPS if g != "h"]
+
+        def read(expression: ca.SX) -> ca.SX:
+            found = ca.substitute([ca.SX(expression)], symbols, full)[0]
+            return ca.SX(ca.cse(ca.densify(found)))
+
+        return read
 
     def pack(self, groups: dict[str, np.ndarray]) -> np.ndarray:
         """Rows Y (..., n) of physical full values per group."""

@@ -39,7 +39,7 @@ def written(
         columns[quantity.header] = values
     for name, group in groups(model).items():
         columns |= {q.header: values for q, values in zip(group, x[name].T, strict=True)}
-    meta = {"kind": "plan", "run": run, **model.mechanism.scene.json()}
+    meta = {"kind": "plan", "run": run, **model.mechanism.scene.dump()}
     return Trajectory(time, columns, meta)
 
 

@@ -139,13 +139,20 @@ def _momentum(
     model: Model, layout: Layout, reduction: Reduction, dynamics: ca.SX, h: ca.SX
 ) -> StageRows:
     """Equations of motion times the step, projected on the half robot (virtual work)."""
-    kept, rows = layout.quantities["q"], model.node.dynamics_rows
-    B = ca.sparsify(ca.DM(reduction.B["q"]))
-    scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in rows]
-    g = ca.mtimes(B.T, dynamics / ca.DM(scale)) * h / STEP
+    kept, g = layout.quantities["q"], project(model, reduction, dynamics) * h / STEP
     units = ["N" if q.unit == "m" else "N.m" for q in kept]
     size = [model.mechanism.weight * (1.0 if unit == "N" else ANGLE_ARM) for unit in units]
     return _rows("defect", g, [f"dynamics:{q.name}" for q in kept], units, scales=size)
+
+
+def project(model: Model, reduction: Reduction, dynamics: ca.SX) -> ca.SX:
+    """Scaled equations of motion (half n,) [1] of the half robot, by virtual work.
+
+    `dynamics` (n,): the equations of the whole robot [N or N.m].
+    """
+    scale = [r.scale * (1.0 if r.unit == "N" else ANGLE_ARM) for r in model.node.dynamics_rows]
+    B = ca.sparsify(ca.DM(reduction.B["q"]))
+    return ca.mtimes(B.T, dynamics / ca.DM(scale))
 
 
 def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> StageRows:
@@ -189,11 +196,21 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
     return index, factor, offset
 
 
+def requirement_row(g: ca.SX, requirement: Requirement) -> StageRows:
+    """The row of a requirement on the scalar expression g, in its scale."""
+    scale, ends = requirement.scale, (requirement.lower, requirement.upper)
+    low, high = (end / scale for end in ends)
+    label, unit = (requirement.label,), (requirement.quantity.unit,)
+    return StageRows("requirement", g / scale, low, high, label, unit, (scale,))
+
+
 def tighter_bounds(
-    lower: np.ndarray, upper: np.ndarray, ends: Sequence[float]
+    lower: np.ndarray, upper: np.ndarray, factor: float, offset: float, asked: Requirement
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Bounds (n,) of variables within both ends as well; equal where they cross by rounding only.
-    None where they cross by more: no solver takes such bounds, but a row says what is asked."""
+    """Bounds (n,) of variables x by which factor x + offset also is what is asked; equal where they
+    cross by rounding only. None where they cross by more: no solver takes such bounds, but a row
+    says what is asked."""
+    ends = sorted((end - offset) / factor for end in (asked.lower, asked.upper))
     low, high = np.maximum(lower, ends[0]), np.minimum(upper, ends[1])
     if (low - high > ROUNDED).any():
         return None

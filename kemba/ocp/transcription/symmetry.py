@@ -215,10 +215,7 @@ def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> 
         ends = (lower, upper) if sign > 0 else (-upper, -lower)
         return {(*each, *_when(w, sign), *ends) for each in product(*alike)}
 
-    def has_image(w: Requirement) -> bool:
-        return bool(asked & (images_of(w, 1) | images_of(w, -1)))
-
-    return [w for w in requirements if has_image(w)]
+    return [w for w in requirements if asked & (images_of(w, 1) | images_of(w, -1))]
 
 
 def _when(w: Requirement, sign: int = 1) -> tuple[object, ...]:

@@ -18,7 +18,6 @@ p   (5,): relaxation of the pairs and four weights (see `Parameters`)
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -29,7 +28,7 @@ from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.first_node import Held, granted, state_rows
-from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
+from kemba.ocp.transcription.layout import STEP, Layout
 from kemba.ocp.transcription.stage import (
     INF,
     Interval,
@@ -38,6 +37,7 @@ from kemba.ocp.transcription.stage import (
     as_variable,
     bounded_below,
     build_stage,
+    requirement_row,
     tighter_bounds,
 )
 from kemba.ocp.transcription.symmetry import Reduction
@@ -100,6 +100,7 @@ class Transcription:
         self.reduction = reduction
         self.layout = Layout(model, reduction, task.duration / nodes, task.step_variation)
         self.stage: Interval = build_stage(model, self.layout, reduction, task.cost)
+        self.of_state = self.layout.reader(model.node, self.stage.y)
         n = self.layout.size
         self.shape = (nodes + 1, n + self.extra_columns())
         self.lower, self.upper = np.zeros(self.shape), np.zeros(self.shape)
@@ -160,7 +161,7 @@ class Transcription:
             variable = as_variable(g, self.stage.y)
             if variable is not None and self._tighten(where, variable, requirement):
                 return None
-        rows = _requirement_row(g, requirement)
+        rows = requirement_row(g, requirement)
         return RowBlock(*self.local(requirement, rows.g, where, index)), rows, where
 
     def local(
@@ -226,22 +227,10 @@ class Transcription:
             room = quantity_expression(self.model, requirement.quantity.name)
             for share in WITHIN:
                 q = (1 - share) * ends[0] + share * ends[1]
-                rows = _requirement_row(ca.substitute(room, self.model.node.q, q), requirement)
+                rows = requirement_row(ca.substitute(room, self.model.node.q, q), requirement)
                 block = RowBlock(ca.vertcat(stage.y0, stage.y), rows.g, ca.SX(0), both)
                 blocks.append((block, rows, where))
         return blocks
-
-    def of_state(self, expression: ca.SX) -> ca.SX:
-        """An expression of the node's q, v, s, u, lam in the stage's y."""
-        node = self.model.node
-        symbols = [node.q, node.v, node.s, node.u, node.lam]
-        found = ca.substitute([ca.SX(expression)], symbols, self._full)[0]
-        return ca.SX(ca.cse(ca.densify(found)))
-
-    @cached_property
-    def _full(self) -> list[ca.SX]:
-        """The node's q, v, s, u, lam of the whole robot in the stage's y."""
-        return [ca.densify(self.layout.full(self.stage.y, g)) for g in GROUPS if g != "h"]
 
     def requirement_expressions(self) -> Iterator[tuple[Requirement, ca.SX, list[int]]]:
         """Every requirement with its expression in the stage's y and the nodes where it holds.
@@ -273,10 +262,8 @@ class Transcription:
     ) -> bool:
         """Whether the bounds of a variable can say a requirement; if so they do."""
         index, factor, offset = variable
-        ends = sorted(
-            ((requirement.lower - offset) / factor, (requirement.upper - offset) / factor)
-        )
-        tighter = tighter_bounds(self.lower[where, index], self.upper[where, index], ends)
+        bounds = self.lower[where, index], self.upper[where, index]
+        tighter = tighter_bounds(*bounds, factor, offset, requirement)
         if tighter is None:
             return False
         self.lower[where, index], self.upper[where, index] = tighter
@@ -299,19 +286,6 @@ class Transcription:
     def times(self, Y: np.ndarray) -> np.ndarray:
         """Times [s] of the nodes, from 0."""
         return np.concatenate([[0.0], np.cumsum(self.h(Y))])
-
-
-def _requirement_row(g: ca.SX, requirement: Requirement) -> StageRows:
-    scale = requirement.scale
-    return StageRows(
-        "requirement",
-        g / scale,
-        requirement.lower / scale if requirement.lower > -INF else -INF,
-        requirement.upper / scale if requirement.upper < INF else INF,
-        (requirement.label,),
-        (requirement.quantity.unit,),
-        (scale,),
-    )
 
 
 def _meanings(rows: StageRows, node: int) -> list[Meaning]:
