@@ -49,16 +49,20 @@ def _own() -> str:
     return "".join(f" --effects {shlex.quote(str(file))}" for file in effect_files.get())
 
 
-def after_solve(run: str, good: bool, status: str = "", feedback: bool = False) -> str:
+def after_solve(run: str, good: bool, status: str = "") -> str:
     """A good plan is executed; another one is looked at, or continued. So is that of `learn`."""
     if status == "interrupted":
         return f"solve --resume {shlex.quote(run)}"
-    return after_plan(run, feedback) if good else f"report {shlex.quote(run)}"
+    return after_plan(run) if good else f"report {shlex.quote(run)}"
 
 
-def after_plan(run: str, feedback: bool = False) -> str:
-    """A plan is executed on the simulated robot, where it costs nothing."""
-    return f"simulate {shlex.quote(run)} {'--policy ' * feedback}{EXECUTED}"
+def after_plan(run: str) -> str:
+    """A plan is executed on the simulated robot, where it costs nothing, with its feedback if it
+    has some."""
+    from kemba.runs import POLICY
+
+    policy = "--policy " * (Path(run) / POLICY).is_file()
+    return f"simulate {shlex.quote(run)} {policy}{EXECUTED}"
 
 
 def after_simulate(logs: Sequence[Log], run: Path) -> str:

@@ -134,8 +134,7 @@ def solve(
     else:
         typer.echo(answer["run"])
         say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
-        feedback = "feedback" in answer
-        say_next(after_solve(answer["run"], answer["good"], answer["status"], feedback), quiet)
+        say_next(after_solve(answer["run"], answer["good"], answer["status"]), quiet)
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:

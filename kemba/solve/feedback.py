@@ -11,7 +11,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.ocp.certificate.status import Status
-from kemba.plant.certificate import begins_moving, moving_start, plant_run, rest_after
+from kemba.plant.certificate import begins_moving, plant_run, rest_after
 from kemba.plant.controller import read_controller
 from kemba.plant.repeat import VALVE_SCATTER
 from kemba.plant.replay import Replay
@@ -45,12 +45,13 @@ def with_feedback(trial: Trial, execution: TrialOrder) -> Trial | None:
     """The trial with a policy that makes it good; None where there is none, or is none to be asked.
 
     Its inputs and its table must keep to the plan on its own model: feedback is for what a plant
-    does otherwise. A learnt model's verdict asks no plant, and strides are played open loop.
+    does otherwise. A learnt model's verdict asks no plant; strides, and what begins in motion, are
+    played open loop.
     """
     done, table, found = trial.judged, trial.motions.table, trial.plan
     if done is None or table is None or found.status is not Status.SOLVED:
         return None
-    if not done.replays or done.truth.learnt or done.stability is not None:
+    if not done.replays or done.truth.learnt or begins_moving(found.model, found.trajectory):
         return None
     execution.tell("replay: with feedback of the body's pose")
     try:
@@ -70,8 +71,7 @@ def _played(trial: Trial, done: Judged, way: str, arrays: Mapping[str, Array]) -
     plan, machine, file = found.trajectory, plant_of(found.task), BytesIO()
     np.savez(file, **arrays)  # type: ignore[arg-type]
     allowed = allowances(found.task.tolerances, landing_speed(plan))["plant_replay"]
-    start = moving_start(machine, plan) if begins_moving(found.model, plan) else None
-    given = rest_after(found.model, plan, table), start, 1e-3, True, VALVE_SCATTER
+    given = rest_after(found.model, plan, table), None, 1e-3, True, VALVE_SCATTER
     executions: list[tuple[Verdict, Replay]] = []
     for seed in range(PLAYED):
         file.seek(0)
