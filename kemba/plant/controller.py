@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from kemba.config import Section, parse
 from kemba.effects.mechanics.hip import Motor
 from kemba.errors import KembaError
 from kemba.events import STANDS
@@ -15,17 +16,17 @@ from kemba.plant.commands import Commands, JointControl, Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.replay import Replay, first_row, judge
 from kemba.plant.simulate import Condition, Simulated, lowest_foot, run_many, simulate_one
+from kemba.quantity import Param
 from kemba.trajectory import SAME_TIME, Trajectory
 
 PERIOD = 1e-3  # s; the controller's rate (paper, IV-B)
 
 
-@dataclass(frozen=True)
-class Gains:
-    """K_p [N.m.rad-1] and K_d [N.m.s.rad-1] of eq. 10; the paper does not give them."""
+class Gains(Section):
+    """Gains of the hips' controller, of eq. 10; the paper does not give them."""
 
-    K_p: float = 150.0
-    K_d: float = 4.0
+    K_p: Annotated[float, Param("N.m.rad-1", lower=0.0)] = 150.0
+    K_d: Annotated[float, Param("N.m.s.rad-1", lower=0.0)] = 4.0
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def condition_of(
     motion begins there. After the last row the last commands stay for `extra` [s]. `valves` replace
     the table's. Raises KembaError when the table lacks a column.
     """
-    gains = gains or Gains(*(table.meta.get(k, v) for k, v in vars(Gains()).items()))
+    gains = gains or parse({k: table.meta.get(k, v) for k, v in Gains()}, Gains)
     profiles = {
         quantity.name: Profile.of(table.time, _column(table, quantity.name)).from_closed()
         for quantity in model.inputs.values()

@@ -23,6 +23,7 @@ from kemba.errors import KembaError, suggest
 from kemba.events import STANDS
 from kemba.model import Model
 from kemba.model.spec import Supply
+from kemba.plant.controller import Gains
 from kemba.plant.replay import first_row
 from kemba.plant.simulate import initial_values, lowest_foot
 from kemba.quantity import Param
@@ -72,13 +73,6 @@ class Spread(Section):
         return next(((a, b) for a, b in pairs if a is not None and b is not None), ())
 
 
-class GainSet(Section):
-    """Gains of the hips' controller (paper, eq. 10)."""
-
-    K_p: Annotated[float, Param("N.m.rad-1", lower=0.0)] = 150.0
-    K_d: Annotated[float, Param("N.m.s.rad-1", lower=0.0)] = 4.0
-
-
 class Conditions(Section):
     """The conditions under which a plan is executed.
 
@@ -93,7 +87,7 @@ class Conditions(Section):
     jitter: Annotated[float, Param("s", lower=0.0, upper=0.05)] = 0.0
     seed: Annotated[int, Field(ge=0)] = 0
     after: Annotated[float, Param("s", lower=0.0, upper=5.0)] = 0.0
-    gains: GainSet = Field(default_factory=GainSet)
+    gains: Gains = Field(default_factory=Gains)
     effects: dict[str, dict[str, Value]] = Field(default_factory=dict)
     start: dict[str, Value] = Field(default_factory=dict)
 

@@ -12,7 +12,7 @@ from kemba.files import sha256
 from kemba.model import Model
 from kemba.ocp.task.task import parse_task
 from kemba.plant.commands import scattered
-from kemba.plant.controller import Gains, execute, read_controller
+from kemba.plant.controller import execute, read_controller
 from kemba.plant.repeat import PLAIN, counterpart
 from kemba.plant.replay import Replay
 from kemba.runs import load_run
@@ -126,7 +126,7 @@ def run_on_plant(work: Work) -> Replay:
     done = execute(
         table,
         model,
-        gains=Gains(conditions.gains.K_p, conditions.gains.K_d),
+        gains=conditions.gains,
         extra=conditions.after,
         start=standing(model, table, start_offsets(model, conditions)),
         valves=scattered(model, table, conditions.jitter, rng) if conditions.jitter else None,

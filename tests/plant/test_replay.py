@@ -112,7 +112,7 @@ def test_the_controller_plays_the_row_whose_time_has_come(time: float, row: int)
 
 
 def test_a_played_table_shows_in_the_motion_when_its_row_is_due() -> None:
-    done = execute(marked_table(), planning(), Gains(0.0, 0.0)).trajectory
+    done = execute(marked_table(), planning(), Gains(K_p=0.0, K_d=0.0)).trajectory
     assert done["front/hip/tau"][:10] == pytest.approx(np.arange(10.0))
 
 
@@ -160,7 +160,7 @@ def test_a_backflip_ends_upright_after_a_full_turn() -> None:
 
 def test_the_controller_brings_a_hip_back() -> None:
     start = {"body/z": 1.0, "front/hip/q": planning().mechanism.standing["front/hip/q"] + 0.2}
-    done = execute(standing_table(), planning(), Gains(150.0, 4.0), start=start).trajectory
+    done = execute(standing_table(), planning(), Gains(K_p=150.0, K_d=4.0), start=start).trajectory
     torque, error = done["front/hip/tau"], done["front/hip/q"] - start["front/hip/q"]
     assert torque[0] == pytest.approx(-24.8)  # 150 * 0.2 saturates
     assert error[-1] == pytest.approx(-0.2, abs=0.1)

@@ -20,7 +20,7 @@ from kemba.model import Model, load_model
 from kemba.plant.controller import Gains, execute
 from kemba.trajectory import Trajectory
 
-GAINS = Gains(150.0, 3.0)
+GAINS = Gains(K_p=150.0, K_d=3.0)
 # push off, draw the legs in, stretch them
 PULSES = [(FRONT_E, 0.02, 0.19), (REAR_E, 0.02, 0.19)]
 PULSES += [(FRONT_R, 0.26, 0.32), (REAR_R, 0.26, 0.32)]
