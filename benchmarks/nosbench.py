@@ -113,14 +113,15 @@ def good(row: dict[str, Any]) -> bool:
 def table(rows: list[dict[str, Any]]) -> list[str]:
     """The lines of the page for some of the rows."""
     import numpy as np
-    from statsmodels.stats.proportion import proportion_confint
+
+    from kemba.scenarios.share import wilson
 
     whole = _whole(rows)
 
     def share(count: int, of: int) -> str:
         if not of:
             return "none"
-        low, high = proportion_confint(count, of, method="wilson")
+        low, high = wilson(count, of)
         return f"{count} of {of} ({low:.0%} to {high:.0%})"
 
     lines = [

@@ -23,7 +23,7 @@ from kemba.effects.mechanics.ground import GroundFriction
 from kemba.effects.mechanics.load import Payload
 from kemba.events import peak
 from kemba.ocp import controller_table, load_task, plan
-from kemba.plant.certificate import replays
+from kemba.plant.certificate import executions
 from kemba.plant.controller import Execution, execute, execute_many
 from kemba.plant.repeat import counterpart
 from kemba.plant.replay import replay
@@ -89,7 +89,7 @@ def report() -> Iterator[str]:
     yield ""
     begin = time.process_time()
     fresh = counterpart(task.model, task.payload, task.supply, task.plant)
-    replays(found.model, found.trajectory, table, fresh)
+    executions(found.model, found.trajectory, table, fresh)
     cost = time.process_time() - begin
     yield f"Both replays of `solve`, the plant built and translated: {cost:.2f} s."
     yield ""

@@ -50,7 +50,6 @@ ONLY_IN = {
     "rich": {"cli"},
     "dask": {"sweep"},
     "distributed": {"sweep"},
-    "statsmodels": {"scenarios"},
     "pint": {"units"},
     "yaml": {"config"},
     "filelock": {"folders"},

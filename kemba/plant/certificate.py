@@ -90,21 +90,6 @@ DIGITS = 7
 SETTLE = 0.3  # s; the last commands are held so long before a landing is judged
 
 
-def replays(
-    model: Model, plan: Trajectory, controller: Trajectory, plant: str | Model | None = PLANT
-) -> dict[str, Any]:
-    """The entries `replay`, `table_replay`, `plant_replay` and `impacts` of the certificate.
-
-    `replay` plays the inputs of the plan on its own model, `table_replay` the controller's table
-    through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant.
-
-    With the table a plan that ends standing, with its valves closed, has a moment to come to rest
-    before its landing is judged. `impacts` are those of `replay`. `plant_replay` is None without
-    a plant; any is None where a plan that was not solved cannot even be started.
-    """
-    return summaries(model, executions(model, plan, controller, plant))
-
-
 def executions(
     model: Model,
     plan: Trajectory,
@@ -113,8 +98,15 @@ def executions(
     tell: Tell = silent,
     table: Replay | None = None,
 ) -> dict[str, Replay | None]:
-    """What `replays` sums up, with the motions. `tell` gets the name of each execution; `table` is
-    that of the controller's table on `model`, where it was executed before."""
+    """The executions `replay`, `table_replay` and `plant_replay` of the certificate.
+
+    `replay` plays the inputs of the plan on its own model, `table_replay` the controller's table
+    through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant, None
+    without one. With the table a plan that ends standing, with its valves closed, has a moment to
+    come to rest before its landing is judged. Any is None where a plan that was not solved cannot
+    even be started. `tell` gets the name of each execution; `table` is that of the controller's
+    table on `model`, where it was executed before.
+    """
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
 

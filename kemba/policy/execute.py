@@ -23,7 +23,7 @@ class Driver:
 
     policy: Policy
     model: Model
-    knees: dict[str, tuple[Array, Array]]  # by piston column: knee angles and extensions
+    knees: dict[str, ca.Function]  # by piston column: its extension by the angle of the knee
     noise: dict[str, float]
     rng: np.random.Generator
     scatter: float = 0.0
@@ -61,8 +61,7 @@ class Driver:
     def _read(self, name: str, sense: Mapping[str, float]) -> float:
         value = sense.get(name, np.nan)
         if name in self.knees:
-            knee, extension = self.knees[name]
-            value = float(np.interp(sense[f"{name.split('/')[0]}/knee/q"], knee, extension))
+            value = float(self.knees[name](sense[f"{name.split('/')[0]}/knee/q"]))
         sigma = self.noise.get(name.split("/")[-1], 0.0)
         return float(value + sigma * self.rng.standard_normal())
 
@@ -112,18 +111,14 @@ def player_of(file: str | Path, run: str | Path) -> Play:
     return play
 
 
-def _knees(model: Model) -> dict[str, tuple[Array, Array]]:
-    """Piston extensions over knee angles, by piston column, knee angles ascending."""
-    mechanism, found = model.mechanism, {}
+def _knees(model: Model) -> dict[str, ca.Function]:
+    """Piston extensions by knee angles, by piston column."""
+    mechanism = model.mechanism
     names = [c.name for c in mechanism.coordinates]
+    found = {}
     for leg in mechanism.legs:
-        i = names.index(f"{leg}/knee/q")
-        phi = mechanism.port(f"{leg}/piston/x").phi
-        f = ca.Function("x", [mechanism.q[i]], [phi])
-        span = np.linspace(-np.pi, np.pi, 4001)
-        x = np.array(f.map(len(span))(span)).ravel()
-        good = np.isfinite(x) & (x > -0.01) & (x < mechanism.stroke + 0.01)
-        side = np.sign(mechanism.standing[f"{leg}/knee/q"])
-        keep = good & (np.sign(span) == side)
-        found[f"{leg}/piston/x"] = (span[keep], x[keep])
+        angle = mechanism.q[names.index(f"{leg}/knee/q")]
+        found[f"{leg}/piston/x"] = ca.Function(
+            "x", [angle], [mechanism.port(f"{leg}/piston/x").phi]
+        )
     return found

@@ -261,15 +261,6 @@ class EventCourse:
     events: tuple[Event, ...]
     joints: tuple[str, ...]
 
-    def map(self, begin: float, end: float) -> Array:
-        """The slope (n, n) of the state at `end` [s] by the state at `begin` [s], no policy."""
-        n, m = self.hybrid.size, len(self.joints)
-        found = np.eye(n + m)
-        for event in self.events:
-            if begin - 1e-9 <= event.time < end - 1e-9:
-                found = plain(event, n, m) @ found
-        return found[:n, :n]
-
 
 def plain(event: Event, n: int, m: int) -> Array:
     """The map of (x, torques) through an event without a policy."""

@@ -23,7 +23,6 @@ from kemba.policy.player import Policy
 from kemba.policy.write import write_policy
 from kemba.runs import POLICY, Run, load_run
 from kemba.scenarios.draw import Scenario, scenarios, standing
-from kemba.settings import Settings, setting
 from kemba.stopwatch import Stage, Tell, silent
 
 UNCERTAINTIES = "twice"  # of configs/uncertainties
@@ -36,13 +35,7 @@ WAYS = {  # which parts act: retimed edges, torques of the hips
 }
 
 
-class TrialSettings(Settings):
-    """How the parts of a policy are tried."""
-
-    count: int = setting(
-        40, "1", "executions with each part",
-        "derived: a share that is 10 % smaller shows in four of them",
-    )  # fmt: skip
+TRIED = 40  # executions with each part: a share that is 10 % smaller shows in four of them
 
 
 def policy_of(run: str | Path, tell: Tell = silent) -> Path:
@@ -89,7 +82,7 @@ def acting(arrays: Mapping[str, Array], edges: bool, hips: bool) -> dict[str, Ar
 def _choose(run: Run, model: Model, file: Path, tell: Tell) -> None:
     """Try the whole policy, then its parts; the gains of what is not kept are set to zero in the
     file."""
-    cases = scenarios(UNCERTAINTIES, plant_of(run.path), TrialSettings.current().count)
+    cases = scenarios(UNCERTAINTIES, plant_of(run.path), TRIED)
     found: dict[str, tuple[int, int]] = {}
     for number, way in enumerate(WAYS, start=1):
         tell(Stage("trying feedback", number, len(WAYS)))

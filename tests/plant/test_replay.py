@@ -8,7 +8,7 @@ import pytest
 from plant.scripts import jump, planning
 
 from kemba.effects.mechanics.hip import Motor
-from kemba.plant.certificate import replays
+from kemba.plant.certificate import executions, summaries
 from kemba.plant.commands import Commands, Profile
 from kemba.plant.controller import Gains, execute, hip_control, motor_limits
 from kemba.plant.kernel.jit import entry
@@ -52,14 +52,15 @@ def test_a_plan_that_is_not_true_is_found_out() -> None:
     assert replay(planning(), lie).apex_error_m < -0.01
 
 
-def test_the_certificate_holds_both_replays() -> None:
-    found = replays(planning(), planned(), standing_table(), planning())
+def test_the_certificate_holds_all_executions() -> None:
+    done = executions(planning(), planned(), standing_table(), planning())
+    found = summaries(planning(), done)
     assert found["replay"]["final_error_m"] < 1e-9
     assert found["plant_replay"]["apex_error_m"] < -0.1
     assert found["table_replay"] == found["plant_replay"]  # here the plant is the same model
-    assert replays(planning(), planned(), standing_table(), None)["plant_replay"] is None
+    assert executions(planning(), planned(), standing_table(), None)["plant_replay"] is None
     buried = planned().with_columns({"body/z [m]": planned()["body/z"] - 0.1})
-    assert replays(planning(), buried, standing_table(), None)["replay"] is None
+    assert executions(planning(), buried, standing_table(), None)["replay"] is None
 
 
 def standing_table(lead: float = 0.006) -> Trajectory:

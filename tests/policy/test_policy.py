@@ -15,7 +15,7 @@ from kemba.plant.repeat import Sensors
 from kemba.policy import player
 from kemba.policy.course import course_of
 from kemba.policy.execute import execute_policy
-from kemba.policy.modes import Edge, EventCourse, Saltation
+from kemba.policy.modes import Edge, EventCourse, Saltation, plain
 from kemba.policy.observer import measured, observer_of
 from kemba.policy.player import Policy
 from kemba.policy.write import gains_of, policy_arrays, write_policy
@@ -59,6 +59,16 @@ def states(model: Model) -> list[str]:
     return [*names, *(q.name for q in model.states.values())]
 
 
+def along(course: EventCourse, begin: float, end: float) -> np.ndarray:
+    """The slope (n, n) of the state at `end` [s] by the state at `begin` [s], no policy."""
+    n, m = course.hybrid.size, len(course.joints)
+    found = np.eye(n + m)
+    for event in course.events:
+        if begin - 1e-9 <= event.time < end - 1e-9:
+            found = plain(event, n, m) @ found
+    return found[:n, :n]
+
+
 @pytest.mark.parametrize("end", [0.02, 0.05, 0.13])
 def test_the_map_from_start_to_landing_is_the_plants(
     model: Model, table: Trajectory, course: EventCourse, end: float
@@ -67,7 +77,7 @@ def test_the_map_from_start_to_landing_is_the_plants(
     names, row = states(model), round(1000 * end)
     start = execute(table, model).trajectory
     base = {name: float(start[name][0]) for name in names}
-    found = course.map(0.0, end)
+    found = along(course, 0.0, end)
     for j, name in enumerate(names):
         step = 1e-4 if j < 7 else 1e-3 if j < 14 else 0.05
         ends = []
@@ -91,7 +101,7 @@ def test_an_edge_that_comes_late_acts_as_in_the_plant(
 ) -> None:
     edge = next(e for e in course.events if isinstance(e, Edge) and e.valve.startswith("front"))
     n = len(states(model))
-    predicted = course.map(edge.time, 0.09) @ edge.late
+    predicted = along(course, edge.time, 0.09) @ edge.late
     ends = []
     for shift in (1e-4, -1e-4):
         profile = Profile(np.array([-1.0, 0.01 + shift, 0.1]), np.array([0.0, 1.0, 0.0]))
@@ -116,11 +126,11 @@ def test_the_filter_goes_from_tick_to_tick_along_the_course(course: EventCourse)
     """Without what a policy adds, and from an edge that comes late on."""
     found = observer_of(course, np.arange(len(course.states)), 0)
     through = np.linalg.multi_dot(found.A[20:70][::-1])
-    assert np.allclose(through, course.map(0.02, 0.07), atol=1e-9 * np.abs(through).max())
+    assert np.allclose(through, along(course, 0.02, 0.07), atol=1e-9 * np.abs(through).max())
     edge = next(e for e in course.events if isinstance(e, Edge))
     row, change = found.late[edge.valve, edge.index]
     assert row / 1000 <= edge.time <= (row + 1) / 1000
-    assert np.allclose(change, course.map(edge.time, (row + 1) / 1000) @ edge.late)
+    assert np.allclose(change, along(course, edge.time, (row + 1) / 1000) @ edge.late)
 
 
 def test_the_filter_tells_deviations_from_noise(

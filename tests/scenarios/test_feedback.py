@@ -9,8 +9,7 @@ from typer.testing import CliRunner
 
 from kemba.errors import KembaError
 from kemba.scenarios import feedback
-from kemba.scenarios.feedback import TrialSettings, policy_of, words_of
-from kemba.settings import changed
+from kemba.scenarios.feedback import policy_of, words_of
 from kemba_cli.main import app
 
 
@@ -44,8 +43,8 @@ def test_the_parts_with_which_most_executions_come_out_are_kept(
 ) -> None:
     (run / "policy.npz").unlink(missing_ok=True)
     monkeypatch.setattr(feedback, "_tried", lambda run, model, file, way, cases: found[way])
-    with changed(TrialSettings, count=4):
-        file = policy_of(run)
+    monkeypatch.setattr(feedback, "TRIED", 4)
+    file = policy_of(run)
     with np.load(file) as data:
         assert (bool(data["edge_gain"].any()), bool(data["hip_gains"].any())) == kept
         assert len(data["tried"]) == tried
@@ -55,10 +54,12 @@ def test_the_parts_with_which_most_executions_come_out_are_kept(
     )
 
 
-def test_a_policy_is_made_once_and_succeeds_where_it_says(run: Path) -> None:
+def test_a_policy_is_made_once_and_succeeds_where_it_says(
+    run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (run / "policy.npz").unlink(missing_ok=True)
-    with changed(TrialSettings, count=4):
-        file = policy_of(run)
+    monkeypatch.setattr(feedback, "TRIED", 4)
+    file = policy_of(run)
     made = file.stat().st_mtime_ns
     assert policy_of(run / "controller.csv") == file and file.stat().st_mtime_ns == made
     with np.load(file) as data:
