@@ -213,4 +213,4 @@ def test_thresholds_of_verdicts_and_stages_are_in_the_sensitivity_study() -> Non
         for field in dataclasses.fields(cls)  # type: ignore[arg-type]
         if field.metadata["decides"]
     }
-    assert {"Relaxation.loose", "Starts.interior_push", "Ends.tol"} <= deciding
+    assert {"Relaxation.loose", "Starts.changed", "Ends.tol"} <= deciding

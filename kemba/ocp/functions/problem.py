@@ -73,15 +73,11 @@ def violation(program: Program, g: np.ndarray) -> float:
 
 
 class Newton(Settings):
-    """Newton steps, starts and the stagnation test."""
+    """Newton steps of whole robots."""
 
     regularisation: float = setting(
         2e-3, "1", "multiple of the identity in the Hessian of whole robots, per scaled variable; "
         "IPOPT's own additions are 1e-4 to 1", "tuned: benchmarks/variants.py", decides=True,
-    )  # fmt: skip
-    progress: float = setting(
-        0.8, "1", "part of the violation that may be left for a solve to count as progressing",
-        "convention: a fall by a fifth", decides=True,
     )  # fmt: skip
 
 

@@ -8,8 +8,6 @@ from time import thread_time
 
 import numpy as np
 
-from kemba.ocp.functions.problem import Newton
-
 
 class Ending(str, Enum):
     """How one solve ended; the value is a word for reports, `sentence` says it in plain words."""
@@ -77,6 +75,7 @@ _IPOPT = {
 
 
 USUAL = 5  # iterations by whose median time others are called long
+PROGRESS = 0.8  # part of the violation that may be left where a solve makes progress
 
 
 @dataclass
@@ -96,7 +95,7 @@ class Stagnation:
     def hear(self, iteration: int, violation: float) -> None:
         """Take notice of an iteration."""
         self.ends.append(thread_time())
-        if violation < Newton.current().progress * self.best:
+        if violation < PROGRESS * self.best:
             self.best, self.since = violation, iteration
         stuck = self.best > self.small and iteration - self.since >= self.iterations
         self.found = stuck or self.too_slow()
