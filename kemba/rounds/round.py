@@ -311,7 +311,7 @@ def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     task, document = load_task(asked.target, list(asked.overrides))
     update: dict[str, Any] = {"model": found.model, "plant": beside(task.plant, Path())}
     if asked.correct:
-        found = _with_correction(found, old, run)
+        found = replace(found, correction=correction_from(found.executed, found.simulated))
     left = min(task.solver.time_limit, max(0.1, PLANNING * (due - time.monotonic())))
     update["solver"] = task.solver.model_copy(update={"time_limit": left})
     task = task.model_copy(update=update)
@@ -355,28 +355,6 @@ def _learnt(
         was_expected=expected_of(run),
         remarks=(*past.remarks, *outcome.few(past.logs)),
     )
-
-
-def _with_correction(found: Round, old: Task, run: Run) -> Round:
-    """The round with what executions do beyond the model; without it where the table that was
-    executed had a correction, and the model says that the plain one would have come as near."""
-    correction = correction_from(found.executed, found.simulated)
-    plain = run.path / PLAIN
-    if not plain.is_file():
-        return replace(found, correction=correction)
-    model = task_model(old.model_copy(update={"model": found.model}))
-    there = _simulated(
-        model, run.trajectory, Trajectory.read(plain), load_machine(old.model, scene=old.scene)
-    )
-    without = abs(there.apex - found.planned.apex)
-    if without > abs(found.executed_apex_error):
-        return replace(found, correction=correction)
-    said = (
-        "the correction of the executed table is undone: by the learnt model the plain table "
-        f"would have missed the apex by {1e3 * without:.1f} mm, and the corrected one missed it by "
-        f"{1e3 * abs(found.executed_apex_error):.1f} mm"
-    )
-    return replace(found, remarks=(*found.remarks, said))
 
 
 def finite(value: float) -> float | None:

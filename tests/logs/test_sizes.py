@@ -56,6 +56,20 @@ def test_a_unit_is_that_of_its_own_column(
 
 
 @pytest.mark.parametrize(
+    ("changes", "other"),
+    [
+        ({"body_z": ("body_z_cm", 1e2)}, "may be cm"),
+        ({"rear_hip_tau": ("rear_hip_tau", 1e3)}, "may be something else"),
+    ],
+)
+def test_what_else_a_unit_may_be_is_told(
+    changes: dict[str, tuple[str, float]], other: str, tmp_path: Path
+) -> None:
+    (question,) = drafted(tmp_path, **changes).questions
+    assert question.endswith(other)
+
+
+@pytest.mark.parametrize(
     ("changes", "expected"),
     [
         ({"body_z": 1e3}, {"body/z": "mm"}),

@@ -71,6 +71,13 @@ def test_an_effect_is_small_beside_what_the_answer_leaves(beside: float, named: 
     assert simplest(search, Selection(("hum", "kick"), 0.01)).best == named
 
 
+def test_what_is_dismissed_leaves_no_rivals() -> None:
+    """They were rivals of the larger answer."""
+    left = Selection(("hum", "kick"), 0.01, rivals=(("wave",),)).without(("hum", "kick"), ("kick",))
+    assert (left.best, left.rivals) == (("kick",), ())
+    assert left.dismissed == {("hum", "kick")}
+
+
 def test_a_larger_answer_with_an_effect_that_was_left_out_is_no_rival() -> None:
     problem = Toy({"kick.a": 9.0, "hum.a": 0.5, "wave.a": 3.0})
     problem.measured = problem.measured + 4.0 * np.sin(200 * problem._time)
