@@ -163,7 +163,7 @@ def test_a_graze_is_told_with_its_line() -> None:
     task, _ = load_task("jump.yaml", ["clearance=3 cm"])
     (graze,) = grazes(flight((0.0, 0.01), (0.04, 0.044), (0.08, 0.1)))
     assert not_clear(task, graze) == (
-        f"`clearance` (--set clearance): 0.03 m is asked, but {graze.sentence}"
+        f"`clearance` (--set clearance=3 cm): 0.03 m is asked, but {graze.sentence}"
     )
 
 
