@@ -85,6 +85,7 @@ def of_plan(certificate: Facts, run: str, events: Events | None) -> ReviewVerdic
         f"The plan is good: the body's centre reaches {height:.3f} m{feet}; {robot}.",
         f"send {sent} to the robot, or execute it on the simulated one:",
         f"kemba-opt simulate {shlex.quote(run)} {policy}--repeat 3 --noise",
+        f"by controller.csv alone {feedback['alone']}." if feedback else "",
     )
 
 

@@ -20,7 +20,7 @@ from kemba.policy.execute import execute_policy
 from kemba.policy.modes import Array
 from kemba.policy.player import Policy
 from kemba.policy.write import policy_arrays
-from kemba.scenarios.feedback import WAYS, acting
+from kemba.scenarios.feedback import KEPT, WAYS, acting
 from kemba.solve.judged import Feedback, Judged, landing_speed, plant_of
 from kemba.solve.trial import Trial, TrialOrder, confirmed
 from kemba.solve.verdict import EXECUTIONS, Verdict, allowances, judge
@@ -85,5 +85,7 @@ def _played(trial: Trial, done: Judged, way: str, arrays: Mapping[str, Array]) -
         executions.append((verdict, run))
     verdict, worst = max(executions, key=lambda one: one[0].share)
     alone = done.verdicts["plant_replay"]
+    told = zip(KEPT, ([way], [PLAYED], [PLAYED], PLAYED), strict=True)
+    arrays = {**arrays, **{key: np.array(value) for key, value in told}}
     feedback = Feedback(way, arrays, verdict, alone, worst.summary())
     return replace(done, feedback=feedback, motion=plant_run(worst))

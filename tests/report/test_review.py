@@ -238,6 +238,15 @@ def test_a_plan_that_asks_too_much_is_told_what_can_be_reached() -> None:
     assert "height asks 0.9 m, and 0.61 m can be reached" in said.next
 
 
+def test_a_plan_that_needs_feedback_says_so() -> None:
+    feedback = {"by": "edges", "alone": "the simulated robot tips over"}
+    certificate = {"status": "solved", "good": True, "sentence": "solved", "apex_m": 0.5}
+    said = of_plan({**certificate, "feedback": feedback}, "runs/a", None)
+    assert said.grade == "good" and "with feedback by edges the simulated robot" in said.sentence
+    assert said.doubt == "by controller.csv alone the simulated robot tips over."
+    assert "policy.npz" in said.next and "simulate runs/a --policy" in said.command
+
+
 def test_the_motor_gives_less_at_speed() -> None:
     from kemba.effects.mechanics.hip import Motor
 

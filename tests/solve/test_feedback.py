@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 from kemba.files import read_json
 from kemba.policy.player import Policy
+from kemba.scenarios.feedback import words_of
 from kemba_cli.main import app
 
 
@@ -27,7 +28,9 @@ def test_feedback_keeps_to_what_the_table_alone_misses(tmp_path: Path) -> None:
     assert f"with feedback by {found['feedback']['by']} (policy.npz)" in found["sentence"]
     errors = [abs(f["touchdown_error_s"]) for f in (found["feedback"], found["plant_replay"])]
     assert errors[0] < 4e-3 < errors[1]
-    assert Policy(tmp_path / "run" / "policy.npz").x.shape == (18,)
+    file = tmp_path / "run" / "policy.npz"
+    assert Policy(file).x.shape == (18,)
+    assert words_of(file).startswith(f"feedback by {found['feedback']['by']} (of 3 executions")
 
 
 @pytest.mark.parametrize(("late", "code"), [("1 ms", 1), ("25 ms", 0)], ids=["neither", "table"])
