@@ -16,8 +16,8 @@ from kemba.plant.repeat import Sensors
 from kemba.policy.modes import Array, Edge, Event, EventCourse, Saltation, Tick, plain
 
 # 1 sigma of what a tick adds to the rates of the body [m/s], of its pitch and of joints [rad/s],
-# and to an effect's state as a share of its largest value. Three times as much lets the noise of
-# usual sensors move edges, ten times as much as rates from eight ticks do (docs/policy.md)
+# and to an effect's state as a share of its largest value; three times as much lets the noise of
+# usual sensors move edges further (docs/policy.md)
 BODY, TURN, JOINT, STATE = 1e-3, 3e-3, 0.03, 3e-3
 IMPACT = 0.1  # m/s or rad/s, which an impact adds: it comes at another instant than expected
 PLACED = 0.01  # m or rad and their rates, by which a start is off; effects' states by STARTED

@@ -84,8 +84,11 @@ def _played(trial: Trial, done: Judged, way: str, arrays: Mapping[str, Array]) -
             return None
         executions.append((verdict, run))
     verdict, worst = max(executions, key=lambda one: one[0].share)
-    alone = done.verdicts["plant_replay"]
+    alone = done.verdicts["plant_replay"].sentence
+    said = f"with feedback by {way} (policy.npz) the {verdict.sentence}"
+    said += f"; by controller.csv alone {alone}"
     told = zip(KEPT, ([way], [PLAYED], [PLAYED], PLAYED), strict=True)
     arrays = {**arrays, **{key: np.array(value) for key, value in told}}
-    feedback = Feedback(way, arrays, verdict, alone, worst.summary())
+    facts = {"by": way, "alone": alone, **worst.summary()}
+    feedback = Feedback(arrays, replace(verdict, sentence=said), facts)
     return replace(done, feedback=feedback, motion=plant_run(worst))

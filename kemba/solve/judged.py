@@ -25,25 +25,12 @@ OWN = ("replay", "table_replay")  # the executions on the plan's own model
 
 @dataclass(frozen=True)
 class Feedback:
-    """A policy by which the plant keeps to a plan: which parts act, its arrays, the verdict on its
-    worst execution, that on the table alone, and the figures of the former."""
+    """A policy by which the plant keeps to a plan: its arrays, the verdict on its worst execution,
+    and the entry `feedback` of the certificate."""
 
-    way: str
     arrays: Mapping[str, Array]
     verdict: Verdict
-    alone: Verdict
-    figures: Mapping[str, Any]
-
-    @property
-    def sentence(self) -> str:
-        """What it does, in words."""
-        done = self.verdict.sentence.removeprefix("simulated robot ")
-        with_ = f"with feedback by {self.way} (policy.npz) the simulated robot {done}"
-        return f"{with_}; by controller.csv alone {self.alone.sentence}"
-
-    def json(self) -> dict[str, Any]:
-        """The entry `feedback` of the certificate."""
-        return {"by": self.way, "alone": self.alone.sentence, **self.figures}
+    json: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -84,8 +71,6 @@ class Judged:
     def remarks(self) -> list[str]:
         """What else is to be said of the executions and of what they rest on."""
         found = [v.sentence for v in self.deciding.values() if v.good]
-        if self.feedback is not None:
-            found[-1] = self.feedback.sentence
         if self.truth.learnt:
             found.append(f"on the simulated robot with physical chambers: {self._plant}")
         if self.band is not None and self.band.good:

@@ -153,7 +153,7 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
         names.append(f"the plant has {enumerated(alike)}, too")
     facts: dict[str, Any] = {"verdict_on": done.truth.on}
     facts |= {"band": done.band.json() if done.band else None}
-    facts |= {"feedback": done.feedback.json()} if done.feedback else {}
+    facts |= {"feedback": done.feedback.json} if done.feedback else {}
     if done.good:
         return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}
     return facts | _unconfirmed(found, " and ".join(done.causes), [*names, *done.remarks])
