@@ -31,6 +31,10 @@ def compare(
     out: Annotated[
         Path | None, typer.Option(help="Figure to write: PNG, PDF or SVG (a new compare.png here).")
     ] = None,
+    what_could_be_seen: Annotated[
+        bool,
+        typer.Option("--what-could-be-seen", help="Only which effects these logs could show."),
+    ] = False,
     column_map: Foreign = None,
     force: Force = False,
     own_effects: OwnEffects = None,
@@ -48,6 +52,13 @@ def compare(
     from kemba_cli.next_steps import after_compare, say_next
     from kemba_cli.progress import COMPARE, Progress
 
+    if what_could_be_seen:
+        if run or figure or out:
+            other = "--run" if run else "--out" if out else "--figure"
+            why = f"compares nothing, so that {other} has no use"
+            raise typer.BadParameter(why, param_hint="--what-could-be-seen")
+        _preview(logs, model, column_map, json, quiet)
+        return
     if out is not None and figure is False:
         raise typer.BadParameter("--out names the figure", param_hint="--no-figure")
     path = None
@@ -73,6 +84,34 @@ def compare(
     if not quiet:
         _print(found)
     say_next(after_compare(logs, column_map, model, run, found.good or found.tolerable), quiet)
+
+
+def _preview(logs: list[Path], model: str, column_map: str | None, json: bool, quiet: bool) -> None:
+    """Which effects logs could show, and which standard tests would tell more."""
+    from rich.table import Table
+
+    from kemba.identify.preview import preview
+    from kemba.logs import log_files
+    from kemba_cli.next_steps import discover, say_next
+    from kemba_cli.progress import COMPARE, Progress
+
+    logs = log_files(logs)
+    with Progress(quiet or json, COMPARE) as progress:
+        found = preview(logs, model, column_map, progress.tell)
+    if json:
+        print_json(found.json())
+        return
+    typer.echo(found.told.sentence)
+    for test in found.tests:
+        typer.echo(f"  {test.sentence}")
+    if not quiet:
+        table = Table("effect", "smallest size that shows", "usual size", "unit")
+        for effect, size in found.told.sizes.items():
+            switch = found.switches[effect]
+            shown = "at no size" if size is None else f"{size:.2g}"
+            table.add_row(effect, shown, f"{switch.size:.2g}", switch.unit)
+        results().print(table)
+    say_next(discover(logs, column_map, model), quiet)
 
 
 def _print(found: Comparison) -> None:

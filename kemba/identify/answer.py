@@ -64,7 +64,8 @@ class Answer:
     sentence show the same number. `added`: what `model` has; `sure`: what of it is sure. `figures`
     of the model's own that were fitted as well, and those of single legs and links of the
     `machine`; `covariance` of all that is written, and its `evidence`. `rest`: where the error sits
-    that is left; `next`: what to measure to learn more.
+    that is left; `next`: what to measure to learn more. `alike`: groups of effects that these logs
+    cannot tell apart, though each would show at its usual size.
     """
 
     verdict: Verdict
@@ -76,6 +77,7 @@ class Answer:
     error_after: float = float("nan")
     noise_floor: float = 1.0
     smallest_detectable: Mapping[str, Mapping[str, float | None]] = field(default_factory=dict)
+    alike: Sequence[Sequence[str]] = ()
     formula: str | None = None
     split_by: str = ""
     model: str | None = None

@@ -9,6 +9,7 @@ import numpy as np
 from kemba.identify.answer import ENDED, Answer, DiscoverSettings, Ranked, VerdictSettings, phrase
 from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
 from kemba.identify.infer.formula import Formula, look
+from kemba.identify.infer.identifiability import Identifiability, identifiability
 from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_aliases
 from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
 from kemba.identify.infer.residual import drifting, rest_of
@@ -69,9 +70,17 @@ def discover(
     started = time.monotonic()
     share = DiscoverSettings.searching
     search = Search(problem, started + share * time_limit, say, due=started + time_limit)
+    search.prepare()
+    say(what_shows(search, null_test(search)).sentence)
     found = _discovered(search, search.first(), holdout)
     found.answer.runtime_s = time.monotonic() - started
     return found
+
+
+def what_shows(search: Search, test: NullTest) -> Identifiability:
+    """What the logs of a prepared search can tell, about the null model."""
+    ranker = search.base.ranker(search.points[NULL].linear)
+    return identifiability(ranker, smallest_detectable(ranker, test.threshold))
 
 
 def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> Discovery:
@@ -225,8 +234,7 @@ def _answer(
     named = tuple(effect for effect in rows if effect in best)
     sure = tuple(r for r in named if r not in caveats.unsure and is_sure(rows[r]))
     added = tuple(effect for effect in rows if effect in whole) if verdict in WRITTEN else ()
-    ranker = search.base.ranker(search.points[NULL].linear)
-    sizes = smallest_detectable(ranker, test.threshold)
+    told = what_shows(search, test)
     answer = Answer(
         verdict=verdict,
         p_value_nothing=min(p_value, formula.p_value) if formula else p_value,
@@ -236,8 +244,9 @@ def _answer(
         error_before=before,
         error_after=after,
         smallest_detectable={
-            effect: {problem.candidates[effect].lead.name: size} for effect, size in sizes.items()
+            e: {problem.candidates[e].lead.name: size} for e, size in told.sizes.items()
         },
+        alike=told.alike,
         formula=str(formula) if formula else None,
         split_by="held-out logs" if kept else "runs" if by_run else "time blocks",
         ladder=ladder(search, whole, kept),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from kemba.errors import enumerated
 from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.problem.types import MissingForce
@@ -38,6 +39,9 @@ def answer_parts(answer: Facts, folder: Path, pictures: bool) -> list[str]:
     if remarks:
         listed = "".join(f"<li>{escape(str(remark))}</li>" for remark in remarks)
         parts.append(f"<ul>{listed}</ul>")
+    groups = "; ".join(enumerated(group) for group in answer.get("alike") or ())
+    if groups:
+        parts.append(f"<p>These logs hold too little to tell apart {escape(groups)}.</p>")
     if formula and formula not in sentence:
         parts.append(f"<p>A formula that fits: <code>{escape(formula)}</code></p>")
     if pictures:

@@ -12,7 +12,7 @@ from kemba_cli.main import app
 
 FIELDS = {
     *("verdict", "p_value_nothing", "sentence", "ranking", "added", "error_before", "error_after"),
-    *("noise_floor", "smallest_detectable", "formula", "split_by", "model", "runtime_s"),
+    *("noise_floor", "smallest_detectable", "alike", "formula", "split_by", "model", "runtime_s"),
 }
 RANKED = {
     *("effect", "probability", "parameters", "equivalent_to", "error_before", "error_after"),
@@ -51,6 +51,23 @@ def write_log(path: Path, seed: int, bias: float) -> None:
     header = "time [s],piston/x [m],valve/extend [1],valve/retract [1],piston/F [N]"
     lines = [",".join(f"{value:.7g}" for value in row) for row in table]
     path.write_text("\n".join([header, *lines]) + "\n")
+
+
+def test_what_logs_could_show_is_told_without_a_search(folder: Path) -> None:
+    """A locked rod shows neither friction nor damping; whether the valve or the force sensor is
+    late only a rod that moves tells."""
+    done = run(
+        "compare", folder / "run_0.csv", folder / "run_1.csv", "--what-could-be-seen", "--json"
+    )
+    assert done.exit_code == 0, done.output
+    found = json.loads(done.stdout)
+    assert "valve_delay" in found["shown"] and "seal_friction" not in found["shown"]
+    assert found["smallest_detectable"]["end_cushion"]["c"] is None
+    assert ["valve_delay", "sensor_delay:piston/F"] in found["alike"]
+    late = found["tests"][found["alike"].index(["valve_delay", "sensor_delay:piston/F"])]
+    assert "rig test" in late["test"] and "locked" not in late["test"] and late["nats"] > 5.0
+    refused = run("compare", folder / "run_0.csv", "--what-could-be-seen", "--figure")
+    assert refused.exit_code == 2 and "compares nothing" in refused.stderr
 
 
 def test_check_names_the_next_command(folder: Path) -> None:

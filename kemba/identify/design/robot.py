@@ -186,7 +186,7 @@ def _design_motion(
         if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
             break
         count += 1
-        tried = _try_out(model, sway, rivals)
+        tried = try_out(model, sway, rivals)
         if tried is None:
             continue
         if tried.evidence.first == "":
@@ -200,7 +200,7 @@ def _design_motion(
     return standard, found, count
 
 
-def _try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
+def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
     """A sway on the simulation; None where it is not safe."""
     settings = SwaySettings
     try:

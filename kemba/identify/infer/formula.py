@@ -120,7 +120,7 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not chosen or alone.gain <= catalogue + by_chance(len(names)):
         return None
     noise = redrawn_noise(search, ranker.linear, jacobian)
-    test = bootstrap(ranker, noise, [(name,) for name in names])
+    test = bootstrap(ranker, noise, list(names))
     if alone.gain <= catalogue + test.threshold:
         return None
     return replace(alone, gain=alone.gain - catalogue, p_value=test.p_value(alone.gain))

@@ -79,12 +79,16 @@ class Search:
 
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
+        self.prepare()
         return self.further(self.first())
+
+    def prepare(self) -> None:
+        """The null model, before anything is looked for."""
+        self.say("fitting the model as it is, and a slope for every effect")
+        self.start()
 
     def first(self) -> Hypothesis:
         """The first guess: the best of the single effects that look best."""
-        self.say("fitting the model as it is, and a slope for every effect")
-        self.start()
         best = self._round(NULL, SearchSettings.leaders)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         return best

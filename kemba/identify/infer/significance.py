@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.answer import DiscoverSettings
 from kemba.identify.infer.colour import best_fit
 from kemba.identify.infer.linear import Linear, precision_factor, time_blocks
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker, SpikeSlabSettings
+from kemba.identify.infer.spike_slab import NULL, Ranker, SpikeSlabSettings
 from kemba.identify.problem.types import Array, Labels
 
 
@@ -74,7 +74,7 @@ class NullTest:
         return float(max(np.quantile(self.scores, 1.0 - settings.rare), settings.least))
 
 
-def bootstrap(ranker: Ranker, noise: Array, hypotheses: Sequence[Hypothesis]) -> NullTest:
+def bootstrap(ranker: Ranker, noise: Array, effects: Sequence[str]) -> NullTest:
     """Scores of simulated logs in which nothing is missing.
 
     In each of them the nominal figures are off within their tolerance, every effect is there with
@@ -83,11 +83,9 @@ def bootstrap(ranker: Ranker, noise: Array, hypotheses: Sequence[Hypothesis]) ->
     noise; a random sign of each block makes new noise.
     """
     slopes = _slopes(ranker, noise)
-    base = _evidence(ranker, (), slopes)
-    best = np.full(slopes.shape[1], -np.inf)
-    for hypothesis in hypotheses:
-        best = np.maximum(best, _evidence(ranker, hypothesis, slopes) - base)
-    return NullTest(best, ranker.linear.names, len(noise))
+    parts = [_evidence(ranker, effects, slopes, t) for t in SpikeSlabSettings.tolerances]
+    nothing, *single = logsumexp(parts, axis=0)
+    return NullTest(np.max(single - nothing, axis=0), ranker.linear.names, len(noise))
 
 
 def _slopes(ranker: Ranker, noise: Array) -> Array:
@@ -103,50 +101,42 @@ def _slopes(ranker: Ranker, noise: Array) -> Array:
     return np.asarray((-(truth @ linear.gram.sum(axis=0)) + signs @ noise).T)
 
 
-def _evidence(ranker: Ranker, hypothesis: Hypothesis, slopes: Array) -> Array:
-    """Log evidence (draws,), up to a term that all hypotheses share."""
-    gram = ranker.linear.gram.sum(axis=0)
-    parts, tolerances = [], SpikeSlabSettings.tolerances
-    for tolerance in tolerances:
-        width = ranker.widths(hypothesis, tolerance)
-        factor = precision_factor(gram, width), True
-        eta = -width[:, None] * slopes
-        step = cho_solve(factor, eta)
-        value = 0.5 * np.sum(eta * step, axis=0) - float(np.sum(np.log(np.diag(factor[0]))))
-        parts.append(value + _sign_terms(ranker, hypothesis, width, factor, step))
-    return np.asarray(logsumexp(parts, axis=0) - np.log(len(tolerances)))
+def _evidence(ranker: Ranker, effects: Sequence[str], slopes: Array, tolerance: float) -> Array:
+    """Log evidence (1 + e, draws) of nothing and of each effect alone, up to a term that all share.
 
-
-def _sign_terms(
-    ranker: Ranker, hypothesis: Hypothesis, width: Array, factor: tuple[Array, bool], step: Array
-) -> Array:
-    """What the sign of switches that cannot be negative adds to the evidence (draws,)."""
-    total = np.zeros(step.shape[1])
-    for effect in hypothesis:
-        if not ranker.candidates[effect].lead.signed:
-            i = ranker.lead[effect]
-            unit = np.zeros(len(width))
-            unit[i] = 1.0
-            sd = np.sqrt(cho_solve(factor, unit)[i])
-            total += np.log(2.0) + log_ndtr(step[i] / sd)
-    return total
+    From one factor: only the prior width of one parameter differs (Sherman and Morrison). What
+    cannot be negative gains by its sign.
+    """
+    width, wide = (ranker.widths(h, tolerance) for h in ((), tuple(effects)))
+    lower = precision_factor(ranker.linear.gram.sum(axis=0), width)
+    root = solve_triangular(lower, np.diag(width), lower=True)
+    covariance = root.T @ root
+    step = -covariance @ slopes
+    nothing = -0.5 * np.sum(slopes * step, axis=0) - np.sum(np.log(np.diag(lower)))
+    i = [ranker.lead[e] for e in effects]
+    step, variance = step[i], covariance[i, i][:, None]
+    delta = (wide[i] ** -2.0 - width[i] ** -2.0)[:, None]
+    grows = 1.0 + variance * delta  # of precision
+    gain = -0.5 * (delta / grows * step**2 + np.log(grows)) - np.log(wide[i] / width[i])[:, None]
+    signed = [[ranker.candidates[e].lead.signed] for e in effects]
+    side = np.log(2.0) + log_ndtr(step / np.sqrt(variance * grows))
+    return np.vstack([nothing, nothing + gain + np.where(signed, 0.0, side)])
 
 
 def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | None]:
     """Effect -> size [its switch's unit] that these data would show above the threshold [nats] nine
     times in ten; None where they show it at no size, as a place along level ground."""
     found: dict[str, float | None] = {}
-    prior = SpikeSlabSettings
+    prior, covariance = SpikeSlabSettings, ranker.score(NULL).covariance
     for effect, i in ranker.lead.items():
         size = ranker.candidates[effect].lead.size
-        wide = prior.slab * size
-        covariance = ranker.score((effect,)).covariance
-        told = 1.0 / covariance[i, i] - 1.0 / wide**2
+        wide, little = prior.slab * size, prior.spike * size
+        told = 1.0 / covariance[i, i] - 1.0 / little**2
         if told * wide**2 < BootstrapSettings.silent:
             found[effect] = None
             continue
         variance = 1.0 / told
-        narrow = variance + (prior.spike * size) ** 2
+        narrow = variance + little**2
         gain = 0.5 * (1.0 / narrow - 1.0 / (variance + wide**2))
         occam = 0.5 * np.log((variance + wide**2) / narrow)
         found[effect] = float(np.sqrt(max(threshold + occam, 0.5) / gain) + 1.28 * np.sqrt(narrow))
@@ -216,8 +206,7 @@ def null_test(search: Search) -> NullTest:
     base = search.base
     linear = base.point.mode.linear
     noise = redrawn_noise(search, linear, base.jacobian)
-    singles = [(name,) for name in search.problem.candidates]
-    return bootstrap(base.ranker(linear), noise, singles)
+    return bootstrap(base.ranker(linear), noise, list(search.problem.candidates))
 
 
 def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:

@@ -119,5 +119,5 @@ def test_what_cannot_be_negative_is_positive_in_simulated_logs() -> None:
     search.start()
     ranker = search.base.ranker(search.base.point.mode.linear)
     silent = np.zeros((40, len(ranker.linear.names)))
-    drag, twin = (np.median(bootstrap(ranker, silent, [(n,)]).scores) for n in ("drag", "twin"))
+    drag, twin = (np.median(bootstrap(ranker, silent, [n]).scores) for n in ("drag", "twin"))
     assert drag > twin + 0.3

@@ -1,0 +1,53 @@
+"""The standard test that tells effects apart which logs cannot: of a piston on a rig, or a sway of
+the robot."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from kemba.errors import enumerated
+from kemba.identify.design.rig import VirtualBench, judged_menu
+from kemba.identify.design.robot import STANDARD, try_out
+from kemba.identify.design.separation import ExperimentSettings, Rivals, Separation
+from kemba.identify.problem.problem import Problem
+from kemba.model import load_model
+
+
+@dataclass(frozen=True)
+class SplittingTest:
+    """Effects that look alike, and the standard test with most evidence [nats] between those
+    nearest to each other; `test` is empty where none shows two of them."""
+
+    effects: Sequence[str]
+    test: str = ""
+    nats: float = 0.0
+    log_s: float = 0.0
+
+    @property
+    def sentence(self) -> str:
+        """The test in words."""
+        names = enumerated(self.effects)
+        if self.nats < ExperimentSettings.clear:
+            return f"no standard test tells apart {names}"
+        told = f"{self.log_s:.2g} s of log, {self.nats:.3g} nats expected"
+        return f"{self.test} would tell apart {names} ({told})"
+
+
+def splitting_test(model: str, problem: Problem, effects: Sequence[str]) -> SplittingTest:
+    """The standard test for effects of a problem of `model`, a YAML or a shipped name."""
+    rivals = Rivals({e: problem.candidates[e].typical() for e in effects}, {})
+    found = [
+        SplittingTest(effects, test, evidence.least, log_s)
+        for test, log_s, evidence in _menu(model, rivals)
+        if len(evidence.nats) == len(effects) - 1
+    ]
+    return max(found, key=lambda test: test.nats, default=SplittingTest(effects))
+
+
+def _menu(model: str, rivals: Rivals) -> Iterator[tuple[str, float, Separation]]:
+    """Every standard test: its name, seconds of log, evidence."""
+    piston, robot = load_model(model, rig=True), load_model(model)
+    if not piston.mechanism.rig:  # of one's own rigs none is known
+        for one in judged_menu(VirtualBench(piston, ExperimentSettings.coarse), rivals):
+            yield f"the rig test '{one.rig.name}'", one.log_s, one.evidence
+    if len(robot.mechanism.legs) > 1 and (sway := try_out(robot, STANDARD, rivals)):
+        yield "a slow sway of the robot", sway.log_s, sway.evidence
