@@ -28,7 +28,7 @@ from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.refine import Refined, Refiner, read, reduction_of, refine, valve_columns
-from kemba.ocp.refinement.start import on_elements, solve, warm
+from kemba.ocp.refinement.start import on_elements, solve_along, warm
 from kemba.ocp.relaxation.session import Attempt
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
@@ -159,7 +159,7 @@ class Continuation:
         elif kept is not None:
             options |= ipopt.central(mu, refining.push)
         stagnation = Stagnation(Continuing.patience, Continuing.underway, refining.slow)
-        found = solve(program, begin, options, self.control, stagnation)
+        found = solve_along(program, begin, options, self.control, stagnation)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)

@@ -355,9 +355,6 @@ def _put(
     low, high = requirement.lower / scale, requirement.upper / scale
     if not ca.depends_on(g, view.z("u lam")):
         columns = [_columns(program, node, full=False) for node in nodes]
-        if requirement.location[0] == "obstacles":  # within every element too
-            within = [at for stages in program.columns.stages for at in stages[:-1]]
-            columns += [np.concatenate([at["q"], at["v"], at["s"]]) for at in within]
         program.add(label, view.z("q v s"), g / scale, low, high, columns)
         return
     program.add(label, view.z("q v s u lam"), g / scale, low, high, columns)

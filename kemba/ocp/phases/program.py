@@ -239,7 +239,13 @@ class PhaseProgram:
         """Add the row low <= g(z) <= high, once for each z in `columns` (repeats, len(z))."""
         if columns:
             part = PhasePart((label,), z, ca.SX(g), ca.SX(0), low, high, np.array(columns))
-            self.added.append(part)
+            self.reset([*self.added, part])
+
+    def reset(self, added: list[PhasePart]) -> None:
+        """The program with these rows and costs beside those of the physics."""
+        self.added = added
+        for made in ("problem", "parts", "rows", "g_lower", "g_upper"):
+            self.__dict__.pop(made, None)
 
     def add_cost(self, z: ca.SX, f: ca.SX, columns: np.ndarray) -> None:
         """Add the cost f(z), whose z is at `columns` (len(z),)."""

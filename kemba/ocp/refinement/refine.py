@@ -30,6 +30,7 @@ from kemba.ocp.refinement.start import (
     certificate,
     rough,
     solve,
+    solve_along,
     start_vector,
     to_trajectory,
     warm,
@@ -288,7 +289,8 @@ class Refiner:
 
     def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
-        found = solve(program, Iterate(start), options, self.control)
+        exact = program.scheme is RADAU5 and not program.elastic
+        found = (solve_along if exact else solve)(program, Iterate(start), options, self.control)
         self.iterations += found.iterations
         return found
 

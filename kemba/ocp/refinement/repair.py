@@ -21,7 +21,7 @@ from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.settings import Elements, Refining
-from kemba.ocp.refinement.start import carried, solve, warm
+from kemba.ocp.refinement.start import carried, solve_along, warm
 from kemba.ocp.transcription.layout import STEP
 
 FAR = 0.1  # of the worst misfit
@@ -244,5 +244,5 @@ def _solved(program: PhaseProgram, start: Iterate, control: Control) -> Solution
     """A program with its solution; None where it has none near."""
     settings = Refining.current()
     stagnation = Stagnation(PATIENCE, UNDERWAY, settings.slow)
-    found = solve(program, start, warm(settings.rough_iterations), control, stagnation)
+    found = solve_along(program, start, warm(settings.rough_iterations), control, stagnation)
     return (program, found) if found.solved else None

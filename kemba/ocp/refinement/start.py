@@ -1,6 +1,7 @@
 """The multi-phase program begun from the implicit Euler plan on its grid, and solved by IPOPT;
 the solution as a trajectory at element ends, and its own defects."""
 
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -10,6 +11,7 @@ from kemba.ocp.certificate.asked import measured
 from kemba.ocp.certificate.certify import Certificate, Violation, first_state, violations
 from kemba.ocp.nlp.ending import Stagnation
 from kemba.ocp.nlp.ipopt import Control, Ipopt, Iterate
+from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.modes import phase_notes
 from kemba.ocp.phases.program import Columns, PhaseProgram
 from kemba.ocp.phases.radau import STATE
@@ -138,6 +140,33 @@ def solve(
         stagnation = Stagnation(np.inf, 0.0)
     stagnation = stagnation or Stagnation(*longest)
     return Ipopt(program, own, control).solve(start, stagnation=stagnation)
+
+
+ROUNDS = 4  # of rows between nodes; what is missed after two is little
+
+
+def solve_along(
+    program: PhaseProgram,
+    start: Iterate,
+    options: dict[str, Any],
+    control: Control,
+    stagnation: Stagnation | None = None,
+) -> Iterate:
+    """The same, and again with rows between nodes wherever the solution misses there what holds
+    along the motion. Where that has no solution near, the last one that was found."""
+    found = solve(program, start, options, control, stagnation)
+    spent = found.iterations
+    for _ in range(ROUNDS):
+        known = program.added
+        if not found.solved or not add_missed(program, found.Y):
+            break
+        more = solve(program, Iterate(found.Y), warm(options["max_iter"]), control, stagnation)
+        spent += more.iterations
+        if not more.solved:
+            program.reset(known)
+            break
+        found = more
+    return replace(found, iterations=spent)
 
 
 def exact() -> dict[str, Any]:

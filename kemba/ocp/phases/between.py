@@ -1,0 +1,90 @@
+"""What holds along a motion, asked for between the nodes as well wherever a solution misses it.
+
+Bounds hold at nodes, gaps at stages. A foot that passes the corner of an obstacle moves centimetres
+in an element. Rows at every place in between would be many, of which few matter: those are added
+at which a solution misses what is asked, and the program is solved again from there (the exchange
+method of semi-infinite programming, Hettich and Kortanek, SIAM Review 35, 1993).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from kemba.ocp.phases.modes import OPEN
+from kemba.ocp.phases.program import PhaseProgram, View
+from kemba.ocp.phases.radau import scaled
+from kemba.ocp.task.requirement import SCALES, quantity_expression
+from kemba.ocp.transcription.layout import STEP
+
+SHARES = (0.25, 0.5, 0.75)  # of an element: where the certificate looks
+HALF = 0.5  # of what the certificate allows there: what is missed by more is asked for
+
+
+@dataclass(frozen=True)
+class Along:
+    """low <= g <= high, scaled, of the coordinates along some elements; `allowed`: by how much it
+    may be missed between nodes."""
+
+    label: str
+    g: ca.SX
+    low: float
+    high: float
+    elements: np.ndarray
+    allowed: float
+
+
+def add_missed(program: PhaseProgram, x: np.ndarray) -> bool:
+    """Add rows at the places between nodes where the solution x (size,) misses what holds along the
+    motion; whether there were any."""
+    view, added = View(program), False
+    for asked in list(_along(program, view)):
+        for share in SHARES:
+            z, g = _at(program, view, asked.g, share)
+            columns = np.array([_columns(program, e) for e in asked.elements])
+            f = ca.Function("g", [z], [ca.densify(g)])
+            values = np.array(f.map(len(columns))(x[columns].T)).ravel()
+            over = np.maximum(asked.low - values, values - asked.high)
+            there = list(columns[over > HALF * asked.allowed])
+            program.add(f"{asked.label} between", z, g, asked.low, asked.high, there)
+            added |= bool(there)
+    return added
+
+
+def _along(program: PhaseProgram, view: View) -> Iterator[Along]:
+    """Lengths and angles of coordinates that are bounded along the motion, and open gaps."""
+    node, c = program.model.node, program.columns
+    others = ca.vertcat(node.v, node.s, node.lam, node.u)
+    may = program.task.tolerances.apex / SCALES["m"]
+    for r in program.requirements:
+        if r.at is not None or r.quantity.unit not in ("m", "rad") or r.location[0] == "contacts":
+            continue
+        g, nodes = quantity_expression(program.model, r.quantity.name), r.nodes(program.nodes)
+        if len(nodes) > 1 and not ca.depends_on(g, others):
+            elements, limits = np.array(nodes[:-1]), (r.lower / r.scale, r.upper / r.scale)
+            yield Along(r.label, view.of(g) / r.scale, *limits, elements, may)
+    for i, constraint in enumerate(program.constraints):
+        is_open = [program.phases[p].modes[i] == OPEN for p in c.phase_of]
+        if any(is_open):
+            g = view.of(constraint.gap) / SCALES["m"]
+            yield Along(constraint.label, g, 0.0, np.inf, np.flatnonzero(is_open), may)
+
+
+def _at(program: PhaseProgram, view: View, g: ca.SX, share: float) -> tuple[ca.SX, ca.SX]:
+    """g at a share of an element, as a function of z: coordinates at both ends, rates at its end,
+    duration. The coordinates lie on the parabola through these, as the certificate has it."""
+    layout = program.layout
+    q0, q1, v1 = (scaled(layout, group, name) for group, name in zip("qqv", ("q0", "q1", "v1")))
+    h, left = ca.SX.sym("h"), 1.0 - share
+    scale = {group: ca.DM(layout.scale[layout.slices[group]]) for group in "qv"}
+    step = h * STEP * v1 * scale["v"] / scale["q"]
+    q = q1 - left * step + left**2 * (q0 - q1 + step)
+    return ca.vertcat(q0, q1, v1, h), ca.substitute(g, view.symbols["q"], q)
+
+
+def _columns(program: PhaseProgram, e: int) -> np.ndarray:
+    """Columns of that z of element `e`."""
+    c = program.columns
+    ends = c.end(e)["q"], c.end(e + 1)["q"], c.end(e + 1)["v"]
+    return np.concatenate([*ends, c.h[c.phase_of[e]]])
