@@ -148,7 +148,9 @@ def best_plan(
 
         model = planning.planner.model
         best.result["best_known"] = best_known(planning.planner.task, model, listener.tell)
-    return best if best is last else _with_all(best, last)
+    best = best if best is last else _with_all(best, last)
+    best.result["trials"] = [str(trial) for trial in tried]
+    return best
 
 
 def _with_all(best: Trial, last: Trial) -> Trial:

@@ -89,12 +89,12 @@ class Trial:
         return self.good and self.misses == 0.0
 
     @property
-    def score(self) -> tuple[bool, bool, bool, float, float]:
-        """Better ones are greater: good, a plan at all, true on its own model; by what executions
-        miss; by cost."""
-        found = self.plan
+    def score(self) -> tuple[bool, bool, bool, bool, float, float]:
+        """Better ones are greater: good, a plan at all, one that fulfils its own equations, true on
+        its own model; by what executions miss; by cost."""
+        found, solved = self.plan, self.plan.status is Status.SOLVED
         replays = self.judged is not None and self.judged.replays
-        return self.good, found.status.plan, replays, -self.misses, -found.objective
+        return self.good, found.status.plan, solved, replays, -self.misses, -found.objective
 
 
 def executed(

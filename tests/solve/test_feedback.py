@@ -26,6 +26,7 @@ def test_feedback_keeps_to_what_the_table_alone_misses(tmp_path: Path) -> None:
     assert found["status"] == "solved" and found["good"]
     assert "by controller.csv alone the simulated robot touches down" in found["sentence"]
     assert f"with feedback by {found['feedback']['by']} (policy.npz)" in found["sentence"]
+    assert found["trials"][0].startswith("guess, ") and "misses" in found["trials"][0]
     errors = [abs(f["touchdown_error_s"]) for f in (found["feedback"], found["plant_replay"])]
     assert errors[0] < 4e-3 < errors[1]
     file = tmp_path / "run" / "policy.npz"
