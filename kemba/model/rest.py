@@ -6,7 +6,7 @@ are stiff: air that flows between nearly equal pressures answers within a fifth 
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 from weakref import WeakKeyDictionary
 
 import casadi as ca
@@ -17,6 +17,14 @@ from kemba.model.model import Model, Node
 from kemba.quantity import Quantity
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+class Columns(Protocol):
+    """Values (n,) by name."""
+
+    def __contains__(self, name: str, /) -> bool: ...
+
+    def __getitem__(self, name: str, /) -> Array: ...
 
 
 # s; time after which states count as at rest; a leak would empty any tank in the end (ten times
@@ -119,6 +127,22 @@ def at_rest(model: Model, q: Any, u: Any) -> Array:
         still = ca.substitute(rate_of(node), node.v, ca.SX.zeros(node.v.numel()))
         _KNOWN[model] = Rest(node.s, [node.q, node.u], still, list(model.states.values()))
     return _KNOWN[model](q, u)
+
+
+def told_by(model: Model, s: Array, plan: Columns) -> dict[int, Array]:
+    """Effect states (n,), by their number, that follow from what a plan has of the model's outputs:
+    the pressure of a chamber from its force. Outputs are linear in such a state; `s` (ns,): where
+    the slope is taken. States that the plan itself has are left out."""
+    node, found = model.node, dict[int, Array]()
+    unknown = {str(node.s[i]): i for i, q in enumerate(model.states.values()) if q.name not in plan}
+    for name, value in node.outputs.items():
+        symbols = {str(symbol) for symbol in ca.symvar(ca.SX(value))}
+        if name in plan and len(symbols) == 1 and (own := symbols & set(unknown)):
+            i = unknown[own.pop()]
+            f = ca.Function("f", [node.s[i]], [value, ca.gradient(value, node.s[i])])
+            there, slope = (float(x) for x in f(s[i]))
+            found[i] = s[i] + (np.asarray(plan[name]) - there) / slope
+    return found
 
 
 def rate_of(node: Node) -> ca.SX:

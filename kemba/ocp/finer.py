@@ -12,7 +12,7 @@ from math import ceil
 from kemba.ocp.certificate.certify import costs
 from kemba.ocp.certificate.status import Status, missed_of, verdict
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
-from kemba.ocp.continuation.origin import Origin
+from kemba.ocp.continuation.origin import Origin, completed
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner, searched
@@ -95,17 +95,19 @@ def with_grip(planner: Planner, found: Plan) -> Plan:
 
 
 def refined(planner: Planner, found: Plan) -> Plan:
-    """The plan on its own phases; where that fails, the same with the reason."""
-    session = planner.session
+    """The plan on its own phases and on the model of the planner; where that fails, the same with
+    the reason."""
+    session, model, asked = planner.session, planner.model, tuple(planner.requirements)
     free = found.task.model_copy(update={"grip": 1.0})  # it comes last, from the plan that is found
-    asked = planner.model, free, found.requirements, found.trajectory
-    answer = refine(*asked, control=session.control, tell=session.tell)
+    start = completed(found.trajectory, model)
+    answer = refine(model, free, asked, start, control=session.control, tell=session.tell)
     session.attempts.append(Attempt("phases", answer.ending, answer.iterations))
-    made = _judged(found, answer)
-    return made if answer.plain is None else replace(made, plain=_judged(found, answer.plain))
+    made = _judged(planner, found, answer)
+    plain = answer.plain and _judged(planner, found, answer.plain)
+    return replace(made, plain=plain) if plain else made
 
 
-def _judged(found: Plan, answer: Refined) -> Plan:
+def _judged(planner: Planner, found: Plan, answer: Refined) -> Plan:
     new, certificate = answer.trajectory, answer.certificate
     if answer.ending is Ending.INTERRUPTED:
         kept = "interrupted while refining, the implicit Euler plan is kept"
@@ -119,11 +121,13 @@ def _judged(found: Plan, answer: Refined) -> Plan:
     status, sentence = verdict(found.task, certificate, new, answer.ending)
     return replace(
         found,
+        model=planner.model,
+        requirements=tuple(planner.requirements),
         trajectory=new,
         certificate=certificate,
         status=status,
         sentence=f"{sentence}, in {len(answer.phases)} phases of contacts and valves",
-        cost=costs(found.model, new),
+        cost=costs(planner.model, new),
         refined=True,
         stages=answer.stages,
     )
@@ -153,15 +157,23 @@ def found_and_refined(planner: Planner, refused: bool, new: Judge) -> Plan | Non
         fewer = max(NODES, ceil(planner.task.duration / STEP))
         if planner.task.nodes > fewer:
             coarse = replace(planner, task=planner.task.model_copy(update={"nodes": fewer}))
-            sought = searched(coarse, False)
+            sought = _sought(coarse, False)
             if sought.status is Status.SOLVED and not new(sought):
                 return None
             found = _from_fewer(planner, refined(coarse, sought))
             if found is not None:
                 return found
-    found = searched(planner, refused)
+    found = _sought(planner, refused)
     if found.status is Status.SOLVED and planner.task.refine == "radau":
         return refined(planner, found) if new(found) else None
+    return found
+
+
+def _sought(planner: Planner, refused: bool) -> Plan:
+    """A plan from the guess, on the model on which plans are sought."""
+    seeker = planner.seeking
+    found = searched(seeker, refused)
+    planner.outcome = seeker.outcome
     return found
 
 

@@ -1,8 +1,11 @@
 """Strategies of finding a plan in turn, from coarse to fine and half to whole robot."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 from kemba.model import Model
 from kemba.ocp.infeasibility.elastic import Outcome, elastic
@@ -40,9 +43,20 @@ def grids(nodes: int) -> list[int]:
     return found
 
 
+class LaggedModel(NamedTuple):
+    """A task's model with first-order chambers in the place of physical ones, and what is asked of
+    it."""
+
+    model: Model
+    requirements: list[Requirement]
+
+
 @dataclass
 class Planner:
-    """Builds programs of one task on demand and solves them by a list of strategies."""
+    """Builds programs of one task on demand and solves them by a list of strategies.
+
+    `lags`: on which plans are sought before they are refined on the model itself.
+    """
 
     task: Task
     model: Model
@@ -51,6 +65,14 @@ class Planner:
     start: Trajectory | None = None
     pulse: float = 0.0  # [s], of valves that are sought; the task's dwell where that is more
     outcome: Outcome | None = None  # of the elastic solve after a failure
+    lags: LaggedModel | None = None
+
+    @property
+    def seeking(self) -> Planner:
+        """The planner of the model on which plans are sought."""
+        if self.lags is None:
+            return self
+        return replace(self, model=self.lags.model, requirements=self.lags.requirements, lags=None)
 
     def schedule(self, nodes: int, reduction: Reduction) -> Schedule:
         """A fresh program on a grid of `nodes`; of half a robot, for what is asked of both legs

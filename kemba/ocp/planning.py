@@ -19,6 +19,7 @@ from kemba.config import Document
 from kemba.effects import BY_KIND, load_effects
 from kemba.errors import KembaError
 from kemba.model import Model
+from kemba.model.lags import with_lags
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import Judge, continued, found_and_refined, from_scratch, with_grip
@@ -27,7 +28,7 @@ from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
 from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
-from kemba.ocp.planner import Planner
+from kemba.ocp.planner import LaggedModel, Planner
 from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
@@ -76,12 +77,17 @@ class Planning:
         deadline = min(deadline, time.monotonic() + task.solver.time_limit)
         building, clock = Stopwatch(), Stopwatch()
         with building.running(), clock.running():
+            asked = task
             if task.sequence:
-                task, built, requirements = as_one(task, document)
+                task, built, requirements = as_one(asked, document)
             else:
-                built, requirements = asked_of(task, document, model)
+                built, requirements = asked_of(asked, document, model)
+            lags: LaggedModel | None = None
+            if task.refine == "radau" and start is None and with_lags(built) is not None:
+                many = as_one(asked, document, lags=True)[1:] if asked.sequence else None
+                lags = LaggedModel(*(many or asked_of(asked, document, model, lags=True)))
         session = Session(Control(deadline, log, watch, stop), tell, building=building)
-        return cls(document, Planner(task, built, requirements, session, start), clock)
+        return cls(document, Planner(task, built, requirements, session, start, lags=lags), clock)
 
     @property
     def over(self) -> bool:

@@ -12,6 +12,7 @@ from kemba.config.parsing import sound
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import ConfigErrors, KembaError, listed_errors
 from kemba.model import Model, load_model
+from kemba.model.lags import with_lags
 from kemba.model.spec import changed_effects
 from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Earlier, Requirement
@@ -50,11 +51,16 @@ def _further(document: Document) -> list[KembaError]:
 
 
 def asked_of(
-    task: Task, document: Document, model: str | Path | None = None, partial: bool = False
+    task: Task,
+    document: Document,
+    model: str | Path | None = None,
+    partial: bool = False,
+    lags: bool = False,
 ) -> tuple[Model, list[Requirement]]:
     """The model of a task and its requirements on it.
 
     `partial`: parts of the task are left out, and nothing is said of what they would have given.
+    `lags`: with first-order chambers in the place of physical ones.
     Raises ConfigErrors with every wrong name, unit and range, of changed effects too.
     """
     errors: list[KembaError] = []
@@ -68,6 +74,7 @@ def asked_of(
             )
         except KembaError:
             raise ConfigErrors(errors) from None
+    built = (lags and with_lags(built)) or built
     try:
         found = resolve(task, built, document, partial)
     except KembaError as error:
@@ -134,8 +141,11 @@ def motions(task: Task, document: Document, within: Sequence[str] = ()) -> list[
     return found
 
 
-def as_one(task: Task, document: Document) -> tuple[Task, Model, list[Requirement]]:
-    """A sequence as one task with its model and the requirements of all its motions.
+def as_one(
+    task: Task, document: Document, lags: bool = False
+) -> tuple[Task, Model, list[Requirement]]:
+    """A sequence as one task with its model and the requirements of all its motions; `lags` as in
+    `asked_of`.
 
     Each motion begins in the state in which the one before ends. What it asks of places ahead
     counts from where it begins. Raises KembaError for mistakes in any of the motions.
@@ -152,7 +162,7 @@ def as_one(task: Task, document: Document) -> tuple[Task, Model, list[Requiremen
     requirements: list[Requirement] = []
     begin = 0
     for part, own in parts:
-        model, asked = asked_of(part, own)
+        model, asked = asked_of(part, own, lags=lags)
         requirements += _moved(asked, begin / nodes, part.nodes / nodes)
         for stance, (a, b) in zip(part.contacts, spans(part.contacts), strict=True):
             share = (b - a) * part.nodes / nodes

@@ -4,14 +4,13 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError
 from kemba.events import ends_standing
 from kemba.mechanism.knee import felt
 from kemba.model import Model, load_model
-from kemba.model.rest import at_rest
+from kemba.model.rest import at_rest, told_by
 from kemba.plant.controller import execute
 from kemba.plant.record import Impact
 from kemba.plant.replay import Replay, replay
@@ -34,23 +33,15 @@ def moving_start(machine: Model, plan: Trajectory) -> dict[str, float]:
     (the pressure). States of which the plan knows nothing are where they come to rest while the
     first commands are held. Raises KembaError as `at_rest` does.
     """
-    node = machine.node
     found = {q.name: float(plan[q.name][0]) for q in machine.state if q.name in plan}
     q = np.array([found[c.name] for c in machine.mechanism.coordinates])
     first = min(1, len(plan) - 1)  # inputs act on the interval before a node
     u = [float(plan[i.name][first]) if i.name in plan else 0.0 for i in machine.inputs.values()]
     s = at_rest(machine, q, u)
+    for i, values in told_by(machine, s, plan).items():
+        s[i] = values[0]
     names = [state.name for state in machine.states.values()]
-    unknown = [i for i, name in enumerate(names) if name not in found]
-    for name, value in node.outputs.items():
-        symbols = {str(symbol) for symbol in ca.symvar(ca.SX(value))}
-        own = [i for i in unknown if str(node.s[i]) in symbols]
-        if name in plan and len(own) == 1 and symbols == {str(node.s[own[0]])}:
-            i = own[0]
-            f = ca.Function("f", [node.s[i]], [value, ca.gradient(value, node.s[i])])
-            there, slope = (float(x) for x in f(s[i]))
-            s[i] += (float(plan[name][0]) - there) / slope  # outputs are linear in their state
-    return {**found, **{names[i]: float(s[i]) for i in unknown}}
+    return {**{name: float(value) for name, value in zip(names, s, strict=True)}, **found}
 
 
 SLOW = 0.01  # m/s; slower ones are no news

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from kemba.errors import KembaError, enumerated
+from kemba.model import Model, load_spec
+from kemba.model.lags import with_lags
 from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
@@ -16,6 +18,10 @@ from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
 
+AIR = (
+    "the simulated robot has physical chambers, and this plan has first-order ones: plan with "
+    "--model orifice, or with `chambers: orifice` in a model of your own"
+)
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
@@ -151,12 +157,19 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
     if alike := carried_over(task.model, task.payload):
         names.append(f"the plant has {enumerated(alike)}, too")
+    if done.replays and not done.good and lags_only(found.model, task.plant):
+        names.append(AIR)
     facts: dict[str, Any] = {"verdict_on": done.truth.on}
     facts |= {"band": done.band.json() if done.band else None}
     facts |= {"feedback": done.feedback.json} if done.feedback else {}
     if done.good:
         return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}
     return facts | _unconfirmed(found, " and ".join(done.causes), [*names, *done.remarks])
+
+
+def lags_only(model: Model, plant: str) -> bool:
+    """Whether a model has first-order chambers where the plant has physical ones."""
+    return with_lags(model) is None and (load_spec(plant).chambers == "orifice")
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:

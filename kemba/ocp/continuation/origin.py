@@ -10,6 +10,7 @@ import numpy as np
 
 from kemba.files import atomic_path
 from kemba.model import Model
+from kemba.model.rest import told_by
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.task.requirement import Requirement
@@ -41,7 +42,8 @@ class Origin:
 
 
 def completed(plan: Trajectory, model: Model) -> Trajectory:
-    """The plan with every column that `model` names: new states at rest, new forces and inputs
+    """The plan with every column that `model` names: new states as what the plan has of outputs
+    tells, such as pressures by the forces of their chambers, else at rest; new forces and inputs
     zero."""
     listed = groups(model)
     absent = {
@@ -49,6 +51,12 @@ def completed(plan: Trajectory, model: Model) -> Trajectory:
         for name in ("s", "u", "lam")
         for q in listed[name]
         if q.name not in plan
+    }
+    states = list(model.states.values())
+    rest = np.array([q.value for q in states], dtype=float)
+    told = told_by(model, rest, plan)
+    absent |= {
+        q.header: np.clip(told[i], q.lower, q.upper) for i, q in enumerate(states) if i in told
     }
     return plan.with_columns(absent) if absent else plan
 

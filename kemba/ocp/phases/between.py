@@ -75,7 +75,7 @@ def _at(program: PhaseProgram, view: View, g: ca.SX, share: float) -> tuple[ca.S
     """g at a share of an element, as a function of z: coordinates at both ends, rates at its end,
     duration. The coordinates lie on the parabola through these, as the certificate has it."""
     layout = program.layout
-    q0, q1, v1 = (scaled(layout, group, name) for group, name in zip("qqv", ("q0", "q1", "v1")))
+    q0, q1, v1 = (scaled(layout, name[0], name) for name in ("q0", "q1", "v1"))
     h, left = ca.SX.sym("h"), 1.0 - share
     scale = {group: ca.DM(layout.scale[layout.slices[group]]) for group in "qv"}
     step = h * STEP * v1 * scale["v"] / scale["q"]

@@ -326,7 +326,7 @@ PLACED = ("duration", "min_dwell", "landing.impact_speed", "grip", "contacts", "
 # keys of earlier versions: what an old file is told
 RETIRED = {
     ("fit_air",): "plans are no longer bent to the simulated robot; learn from logs instead, or "
-    "plan with `model: fitted`, whose air is as the simulated robot's own rigs measure it",
+    "plan with `model: orifice`, which has the air of the simulated robot",
     ("landing", "air"): "it served plans that were bent to the simulated robot",
 }
 
