@@ -150,7 +150,8 @@ class Planning:
         refused = self.refused
         task = self.planner.task
         begins = task.model_copy(update=guess.update)
-        planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None)
+        lags = self.planner.lags if guess.lags else None
+        planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None, lags=lags)
         with self.clock.running():
             made = found_and_refined(planner, refused is not None, new)
             if made is None:
@@ -269,11 +270,12 @@ OTHERS = 2  # further guesses at most: each costs as much as the first
 @dataclass(frozen=True)
 class StartGuess:
     """A start guess with `noise` drawn by `seed`, and the shortest `pulse` [s] of a valve that is
-    sought from it."""
+    sought from it; `lags`: by first-order chambers, where the model has physical ones."""
 
     pulse: float
     noise: float
     seed: int
+    lags: bool = True
 
     @property
     def update(self) -> dict[str, Any]:
@@ -287,10 +289,13 @@ def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
     A relaxed valve is open in part; rounded on a grid it opens and closes from node to node. Pulses
     that are shorter than the filling of a chamber move the leg little, and plans with many of them
     have no neighbours without. So they are left out first, and taken only where that gives no plan.
+    Physical chambers are sought with themselves only where first-order ones led to no good plan.
     """
     fill = max(model.mechanism.need_cylinder().fill)
     longer = max(fill, task.min_dwell)
-    found = [StartGuess(pulse, task.guess_noise, task.seed) for pulse in (longer, task.min_dwell)]
+    first = StartGuess(longer, task.guess_noise, task.seed)
+    direct = [replace(first, lags=False)] if with_lags(model) is not None else []
+    found = [first, *direct, replace(first, pulse=task.min_dwell)]
     noise = max(task.guess_noise, NOISE)
     found += [StartGuess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
     return list(dict.fromkeys(found))

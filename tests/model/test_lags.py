@@ -1,9 +1,8 @@
-"""First-order chambers in the place of physical ones push as hard, and their plans become theirs."""
+"""First-order chambers in the place of physical ones push as hard, and lead to their plans."""
 
 import numpy as np
 import pytest
 
-from kemba.effects.pneumatics.chamber import Chamber
 from kemba.effects.pneumatics.gas import GasTemperature, WallHeat
 from kemba.model import Model, load_model
 from kemba.model.lags import with_lags
