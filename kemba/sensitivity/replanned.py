@@ -34,7 +34,7 @@ from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhasePart, PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
-from kemba.ocp.refinement.start import solve, warm
+from kemba.ocp.refinement.start import solve_along, warm
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.layout import STEP
@@ -345,7 +345,7 @@ def solution(source: PlanProgram, task: Task, model: Model) -> Solution:
         program, x = source.built(task, model)
         if weight:
             x = program.proximal(x, weight)
-        point = solve(program, Iterate(x), options, Control())
+        point = solve_along(program, Iterate(x), options, Control())
         if point.solved:
             return Solution(source, program, point)
     assert point.ending is not None

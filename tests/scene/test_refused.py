@@ -11,7 +11,7 @@ from kemba.ocp.reading import load_task
 
 SHIPPED = shipped_configs("tasks")["hurdle.yaml"].read_text(encoding="utf-8")
 KEPT, _, REST = SHIPPED.partition("obstacles:\n")
-AFTER = REST[REST.index("\ncontacts:") :]
+AFTER = REST[REST.index("\nstart:") :]
 NUMBER = KEPT.count("\n") + 1  # of the line with `obstacles:` or `terrain:`
 
 
