@@ -21,21 +21,21 @@ import numpy as np
 
 from kemba.config import parse
 from kemba.ocp import Task, load_task, plan
-from kemba.ocp.functions.problem import Newton
+from kemba.ocp.functions import problem
 from kemba.ocp.nlp.ipopt import Iterate, warm
 from kemba.ocp.relaxation.schedule import find, interior
 from kemba.ocp.relaxation.session import Schedule
 from kemba.ocp.relaxation.settings import Ends, Relaxation, Starts
 from kemba.ocp.transcription.transcribe import Parameters
-from kemba.settings import Settings, changed
 from kemba.sweep import expand, load_sweep, machine
 
 
 @dataclass(frozen=True)
 class Variant:
-    """What a variant changes: settings, the task's solver, whether whole robots grow from half."""
+    """What a variant changes: figures of classes and modules, the task's solver, whether whole
+    robots grow from half."""
 
-    settings: dict[type[Settings], dict[str, object]] = field(default_factory=dict)
+    figures: dict[object, dict[str, object]] = field(default_factory=dict)
     solver: dict[str, object] = field(default_factory=dict)
     grown: bool = True
     ladder: tuple[float, ...] = ()  # relaxations of the pairs solved before the first
@@ -46,7 +46,7 @@ VARIANTS: dict[str, dict[str, Variant]] = {
     "general": {
         "as shipped": SHIPPED,
         "from the guess": Variant(grown=False),
-        "plain Hessian": Variant({Newton: {"regularisation": 0.0}}),
+        "plain Hessian": Variant({problem: {"REGULARISATION": 0.0}}),
         "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),
         "memory by IPOPT's default": Variant(solver={"options": {"mumps_mem_percent": 1000}}),
     },
@@ -71,9 +71,9 @@ def from_loose(schedule: Schedule, start: Iterate, ladder: tuple[float, ...]) ->
     """The schedule's first steps after looser pairs, from loose to tight as `solve_mpcc` does."""
     options, point = interior(), start
     for eps in ladder:
-        parameters = Parameters(eps, forces=Relaxation.current().forces)
+        parameters = Parameters(eps, forces=Relaxation.forces)
         point = schedule.solve(f"pairs by {eps:g}", point, parameters, options=options)
-        options = warm(min(Starts.current().interior_mu, eps), 1e-2, tol=Ends.current().tol)
+        options = warm(min(Starts.interior_mu, eps), 1e-2, tol=Ends.tol)
     return find(schedule, point)
 
 
@@ -85,8 +85,8 @@ def figures(task: Task, variant: Variant) -> list[float]:
             longer = partial(from_loose, ladder=variant.ladder)
             patches.enter_context(patch("kemba.ocp.planner.find", longer))
         log = Path(folder) / "solver.log"
-        for settings, values in variant.settings.items():
-            patches.enter_context(changed(settings, **values))
+        for owner, values in variant.figures.items():
+            patches.enter_context(patch.multiple(owner, **values))
         if not variant.grown:
             patches.enter_context(patch("kemba.ocp.planner.Planner.half", None))
         found = plan(task.model_copy(update={"solver": solver}), log=log)

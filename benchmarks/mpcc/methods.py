@@ -21,7 +21,7 @@ def schedule(program: Mpcc, start: np.ndarray) -> Iterate:
 
     Options and figures are those of kemba/ocp/relaxation, with the Newton steps of whole robots.
     """
-    relaxation, starts, ends = Relaxation.current(), Starts.current(), Ends.current()
+    relaxation, starts, ends = Relaxation, Starts, Ends
     ipopt = Ipopt(program, {"max_iter": MOST})
     first = ipopt.solve(Iterate(start), [relaxation.loose], interior(), regularised=True)
     options = warm(starts.changed_mu, starts.changed, tol=ends.tol)
@@ -36,7 +36,7 @@ def on_branch(program: Mpcc, start: np.ndarray) -> Iterate:
     refining does to a plan, whose modes are fixed."""
     found = schedule(program, start)
     branch = program.branch(program.nearest(found.Y))
-    options = warm(Starts.current().tighten_mu, max_iter=MOST)
+    options = warm(Starts.tighten_mu, max_iter=MOST)
     last = Ipopt(branch, options).solve(Iterate(found.Y), [0.0])
     better = last if last.solved else found
     return replace(better, iterations=found.iterations + last.iterations)
@@ -44,7 +44,7 @@ def on_branch(program: Mpcc, start: np.ndarray) -> Iterate:
 
 def fixed(program: Mpcc, start: np.ndarray) -> Iterate:
     """One solve at the final relaxation, with IPOPT's defaults."""
-    margin = Relaxation.current().margin
+    margin = Relaxation.margin
     ipopt = Ipopt(program, {"max_iter": 3 * MOST, "nlp_scaling_method": "gradient-based"})
     return ipopt.solve(Iterate(start), [margin * FINAL])
 

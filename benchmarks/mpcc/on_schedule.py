@@ -14,7 +14,7 @@ def schedule(given: dict[str, Any]) -> tuple[np.ndarray, int]:
     """What plans do after their valves are known: 1e-3, 1e-4, 8e-7, far inside the bounds first."""
     program = written(given)
     point = Iterate(program.program.start)
-    relaxation, starts, ends = Relaxation.current(), Starts.current(), Ends.current()
+    relaxation, starts, ends = Relaxation, Starts, Ends
     steps = (
         (relaxation.loose, interior()),
         (relaxation.tight, warm(starts.changed_mu, starts.changed, tol=ends.tol)),

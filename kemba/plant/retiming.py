@@ -19,7 +19,6 @@ from kemba.plant.certificate import begins_moving, moving_start, rest_after
 from kemba.plant.controller import execute
 from kemba.plant.kernel.machine import Array
 from kemba.plant.replay import Replay
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 Edges = dict[str, list[int]]  # by valve column: ticks at which it opens, closes, opens ...
@@ -91,16 +90,15 @@ def with_moved(
     return Trajectory(table.time, columns, table.meta)
 
 
-class RetimingSettings(Settings):
-    """How long other roundings of a table are tried, and how near is near enough."""
+class RetimingSettings:
+    """How long other roundings of a table are tried, and which errors need no search."""
 
-    apex: float = setting(0.5e-3, "m", "apex error that needs no search", CHOSEN)
-    touchdown: float = setting(1e-3, "s", "touchdown error that needs no search", "derived: a tick")
-    final: float = setting(0.01, "m", "error of the end that needs no search", CHOSEN)
-    executions: int = setting(
-        24, "1", "simulations at most", "derived: edges on ticks of the plan cost as much; of 30 "
-        "tables 17 took 2 to 24 (benchmarks/retiming.py)",
-    )  # fmt: skip
+    apex = 0.5e-3  # m
+    touchdown = 1e-3  # s: a tick
+    final = 0.01  # m, of the end
+    # simulations at most: edges on ticks of the plan cost as much; of 30 tables 17 took 2 to 24
+    # (benchmarks/retiming.py)
+    executions = 24
 
 
 AHEAD = 1e-3  # m; error of the place ahead, at the planned apex's time, that needs no search
@@ -138,7 +136,7 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
     Errors are in units of `RetimingSettings`.
     """
     run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
-    search = Roundings(run, RetimingSettings.current().executions)
+    search = Roundings(run, RetimingSettings.executions)
     return search.best(table, _last(model, plan))
 
 
@@ -229,14 +227,15 @@ def executed_table(
     model: Model, plan: Trajectory, table: Trajectory, extra: float
 ) -> ExecutedTable:
     """A table of a plan executed on `model`; its last commands stay for `extra` [s]."""
-    limits = RetimingSettings.current()
     try:
         start = moving_start(model, plan) if begins_moving(model, plan) else None
         facts = execute(table, model, extra=extra, start=start).against(model, plan)
     except KembaError:
         return ExecutedTable(table, None, np.full(3, np.inf), np.inf)
-    signed = _errors(plan, facts) / np.array([limits.apex, limits.touchdown, AHEAD])
-    error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / limits.final))
+    signed = _errors(plan, facts) / np.array(
+        [RetimingSettings.apex, RetimingSettings.touchdown, AHEAD]
+    )
+    error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / RetimingSettings.final))
     return ExecutedTable(table, facts, signed.ravel(), error + (0.0 if facts.landed else FALLEN))
 
 

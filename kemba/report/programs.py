@@ -55,8 +55,7 @@ def relaxed(task: Task, model: Model, document: Document) -> Named:
     """The program of the first stage: pairs relaxed, valves anywhere between 0 and 1."""
     planner = Planner(task, model, resolve(task, model, document))
     program = planner.schedule(task.nodes, next(planner.reductions())).transcription
-    loose = Relaxation.current()
-    parameters = Parameters(loose.loose, forces=loose.forces).vector(program.nodes)
+    parameters = Parameters(Relaxation.loose, forces=Relaxation.forces).vector(program.nodes)
     start = np.clip(planner.guess(program).Y, program.lower, program.upper)
     rows = [f"{m.kind} {m.label}" for m in program.meanings]
     return Named("relaxed", program, start.ravel(), parameters, rows)

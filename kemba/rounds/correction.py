@@ -16,7 +16,6 @@ from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
 from kemba.plant.retiming import FALLEN, ExecutedTable, Roundings, edges_of
 from kemba.plotting.source import Machine
-from kemba.settings import CHOSEN, Settings, setting
 from kemba.trajectory import Trajectory
 
 
@@ -112,13 +111,13 @@ def write_correction(
     dump_yaml({**told, "units": units, "edges_moved_ms": moved, **reached}, path)
 
 
-class AimSettings(Settings):
+class AimSettings:
     """How a table is corrected: by moving valve edges, which sets push duration and landing."""
 
     apex = 0.5e-3  # apex error that needs no search [m]
     touchdown = 3e-3  # touchdown error that needs no search [s]
     pitch = 0.009  # pitch at touchdown, beyond the plan's, that a moved edge may make [rad]
-    moved: int = setting(8, "ms", "by which an edge moves at most", CHOSEN, decides=True)
+    moved = 8  # by which an edge moves at most [ms]
     executions = 60  # simulations at most
 
 
@@ -202,7 +201,7 @@ class Aim:
         if not isfinite(wanted.touchdown):
             signed[1:] = 0.0
         moved = _moved(first, table).values()
-        far = any(abs(k) > AimSettings.current().moved for ticks in moved for k in ticks)
+        far = any(abs(k) > AimSettings.moved for ticks in moved for k in ticks)
         if far or (must and not lands) or not np.isfinite(signed).all():
             return ExecutedTable(table, None, signed, FALLEN)
         turns = abs(signed[2]) > 1.0 + 1e-9

@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
+from unittest.mock import patch
 
 import casadi as ca
 import numpy as np
@@ -21,7 +22,6 @@ from kemba.ocp.refinement.repair import merged, misfits, repaired
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.unilateral import read_constraints
 from kemba.plant.replay import replay
-from kemba.settings import changed
 
 CASES = [
     ("jump", "height=0.47 m"),
@@ -228,7 +228,7 @@ def test_refining_ends_at_its_deadline() -> None:
 
 def test_refining_spends_no_more_iterations_than_it_may() -> None:
     euler = euler_plan(*CASES[1])
-    with changed(Refining, iterations=7):
+    with patch.object(Refining, "iterations", 7):
         found = refine(euler.model, euler.task, euler.requirements, euler.trajectory)
     assert not found.solved and 0 < found.iterations <= 7
 

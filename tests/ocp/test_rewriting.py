@@ -1,18 +1,20 @@
 """Functions rewritten for speed give the numbers of the plain ones; so does a proximal term."""
 
+from unittest.mock import patch
+
 import casadi as ca
 import numpy as np
 import pytest
 
 from kemba.model import load_model
 from kemba.ocp import load_task
+from kemba.ocp.functions import code
 from kemba.ocp.functions.blocks import BlockProblem, RowBlock, block_problem
-from kemba.ocp.functions.code import FEW, Code, Functions, canonical_signs, code_of, vectorised
-from kemba.ocp.functions.problem import Newton, Proximal, regularised_hessian
+from kemba.ocp.functions.code import FEW, Code, canonical_signs, code_of, vectorised
+from kemba.ocp.functions.problem import REGULARISATION, Proximal, regularised_hessian
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.symmetry import find_symmetry
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.settings import changed
 
 POINTS = 12
 
@@ -102,7 +104,7 @@ def test_damping_adds_the_same_curvature_everywhere() -> None:
     plain = block_problem([block], 3, ca.SX(0, 1)).hess_lag
     at = (np.random.default_rng(0).normal(size=3), [], 1.5, [0.3, -2.0])
     added = np.array(regularised_hessian(plain)(*at) - plain(*at))
-    assert added == pytest.approx(Newton.current().regularisation * np.eye(3), abs=1e-15)
+    assert added == pytest.approx(REGULARISATION * np.eye(3), abs=1e-15)
 
 
 def test_equal_blocks_share_their_functions_and_others_do_not() -> None:
@@ -120,7 +122,7 @@ def test_equal_blocks_share_their_functions_and_others_do_not() -> None:
 
 def test_only_so_many_blocks_are_kept() -> None:
     z, p = ca.SX.sym("z"), ca.SX.sym("p", 0)
-    with changed(Functions, kept=2):
+    with patch.object(code, "KEPT", 2):
         first = code_of(z, p, z, z + 1.5, shared=True)
         for k in range(3):
             code_of(z, p, z, z + 2.5 + k, shared=True)

@@ -1,6 +1,7 @@
 """The order of solves: whole robots grow from half ones, and switches move as often as asked."""
 
 from contextlib import ExitStack
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from kemba.ocp.planned import Plan
 from kemba.ocp.relaxation.guess import body_course
 from kemba.ocp.relaxation.settings import Ends
 from kemba.ocp.task.resolve import resolve
-from kemba.settings import changed
 
 FORWARD = ("nodes=50", "refine=none")
 PATIENT = "solver.time_limit=600 s"  # a busy machine must not decide
@@ -63,7 +63,7 @@ def test_what_does_not_grow_starts_from_the_guess() -> None:
         def tell(solve: str) -> None:
             solves.append(solve)
             if solve == "round valves (half robot, 25 nodes)":  # just before it grows
-                limits.enter_context(changed(Ends, relax_iterations=2))
+                limits.enter_context(patch.object(Ends, "relax_iterations", 2))
 
         found = plan(task, document, tell=tell, stop=lambda: solves[-1] == whole[-1])
     assert solves[-2:] == whole
@@ -80,7 +80,7 @@ def test_what_does_not_grow_starts_from_the_guess() -> None:
 def test_valves_that_do_not_fit_the_finer_grid_are_sought_again(
     limit: dict[str, int], ending: Ending
 ) -> None:
-    with changed(Ends, **limit):
+    with patch.multiple(Ends, **limit):
         found, solves = told("jump", "nodes=50", "refine=none")
     assert found.status is Status.SOLVED
     assert ending in [attempt.ending for attempt in found.attempts]

@@ -1,19 +1,20 @@
 """What a plan is called that could not be refined."""
 
+from unittest.mock import patch
+
 import pytest
 from plain_task import plain_task
 
 from kemba.ocp import Plan, load_task, plan
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.phases.settings import Refining
-from kemba.settings import changed
 
 
 @pytest.fixture(scope="module")
 def unrefined(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     """A plan whose refinement is given three iterations."""
     task, document = load_task(plain_task(tmp_path_factory.mktemp("plain")), ["nodes=24"])
-    with changed(Refining, iterations=3):
+    with patch.object(Refining, "iterations", 3):
         return plan(task, document)
 
 

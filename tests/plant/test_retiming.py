@@ -1,6 +1,7 @@
 """Edges of a table are moved where its execution shows that this comes nearer to the plan."""
 
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -20,7 +21,6 @@ from kemba.plant.retiming import (
     shared_edges,
     with_moved,
 )
-from kemba.settings import changed
 from kemba.trajectory import Trajectory
 
 
@@ -37,7 +37,7 @@ def test_a_table_with_a_late_valve_comes_nearer_to_its_plan() -> None:
     """Further off than by rounding, so the search may take longer."""
     run = solved("jump")
     spoilt = late(controller_table(run.model, run.plan), 2)
-    with changed(RetimingSettings, executions=80):
+    with patch.object(RetimingSettings, "executions", 80):
         mended = retimed(run.model, run.plan, spoilt).table
     errors = [execute(t, run.model).against(run.model, run.plan) for t in (spoilt, mended)]
     assert abs(errors[1].apex_error_m) < 0.7 * abs(errors[0].apex_error_m)
@@ -84,7 +84,7 @@ def test_edges_that_would_meet_do_not_move() -> None:
 def test_a_table_that_is_near_enough_stays() -> None:
     run = solved("jump")
     table = controller_table(run.model, run.plan)
-    with changed(RetimingSettings, apex=1.0, touchdown=1.0, final=1.0):
+    with patch.multiple(RetimingSettings, apex=1.0, touchdown=1.0, final=1.0):
         assert retimed(run.model, run.plan, table).table is table
 
 

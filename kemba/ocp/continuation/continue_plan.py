@@ -150,15 +150,14 @@ class Continuation:
         begin = Iterate(x)
         if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
             begin = mesh.stages.iterate(program, x)
-        refining = Refining.current()
         options = warm(min(Continuing.iterations, self.task.solver.max_iterations))
-        mu = ipopt.last_barrier(refining.tol)
+        mu = ipopt.last_barrier(Refining.tol)
         if begin.lam_g is not None:
             # a multiplier is at least that of a bound at distance 1
             options |= ipopt.warm(mu, Continuing.push, warm_start_mult_bound_push=mu)
         elif kept is not None:
-            options |= ipopt.central(mu, refining.push)
-        stagnation = Stagnation(Continuing.patience, Continuing.underway, refining.slow)
+            options |= ipopt.central(mu, Refining.push)
+        stagnation = Stagnation(Continuing.patience, Continuing.underway, Refining.slow)
         found = solve_along(program, begin, options, self.control, stagnation)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))

@@ -21,7 +21,6 @@ import numpy as np
 
 from kemba.cache import Recent
 from kemba.instructions import replay
-from kemba.settings import Settings, setting
 
 EVEN = {ca.OP_COS, ca.OP_COSH, ca.OP_SQ, ca.OP_FABS}
 ODD = {ca.OP_SIN, ca.OP_TAN, ca.OP_ASIN, ca.OP_ATAN, ca.OP_SINH, ca.OP_TANH, ca.OP_TWICE}
@@ -106,13 +105,9 @@ def _applied(kind: int, *operands: Any) -> Any:
 FEW = 8  # points at which evaluating one by one is as fast as all at once
 
 
-class Functions(Settings):
-    """How the functions for IPOPT are made."""
-
-    kept: int = setting(
-        400, "1", "blocks whose functions are kept for the next program of the process",
-        "convention: twice the blocks of all programs of a jump",
-    )  # fmt: skip
+# blocks whose functions are kept for the next program of the process: twice those of all programs
+# of a jump
+KEPT = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +188,7 @@ def code_of(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX, shared: bool) -> Code:
     if not shared:
         return Code(z, p, f, g, np.zeros(0))
     text = ca.Function("block", [z, p], [f, g]).serialize()
-    return _kept.get(text, lambda: _rewritten(z, p, f, g), Functions.current().kept)
+    return _kept.get(text, lambda: _rewritten(z, p, f, g), KEPT)
 
 
 def _rewritten(z: ca.SX, p: ca.SX, f: ca.SX, g: ca.SX) -> Code:

@@ -11,8 +11,6 @@ from typing import Any, Protocol
 import casadi as ca
 import numpy as np
 
-from kemba.settings import Settings, setting
-
 
 class Derivatives(Protocol):
     """f and g of a program, and their derivatives, under the names that CasADi's nlpsol knows."""
@@ -72,13 +70,9 @@ def violation(program: Program, g: np.ndarray) -> float:
     return float(over.max(initial=0.0))
 
 
-class Newton(Settings):
-    """Newton steps of whole robots."""
-
-    regularisation: float = setting(
-        2e-3, "1", "multiple of the identity in the Hessian of whole robots, per scaled variable; "
-        "IPOPT's own additions are 1e-4 to 1", "tuned: benchmarks/variants.py", decides=True,
-    )  # fmt: skip
+# multiple of the identity in the Hessian of whole robots, per scaled variable, by
+# benchmarks/variants.py; IPOPT's own additions are 1e-4 to 1
+REGULARISATION = 2e-3
 
 
 class Proximal:
@@ -131,5 +125,5 @@ class Proximal:
 def regularised_hessian(hess_lag: ca.Function) -> ca.Function:
     """(x, p, lam_f, lam_g) -> upper triangle (n, n) of the regularised Hessian."""
     at = hess_lag.mx_in()
-    hessian = hess_lag(*at) + Newton.current().regularisation * ca.MX.eye(hess_lag.size1_out(0))
+    hessian = hess_lag(*at) + REGULARISATION * ca.MX.eye(hess_lag.size1_out(0))
     return ca.Function("hess_lag", at, [hessian], hess_lag.name_in(), hess_lag.name_out())

@@ -183,9 +183,8 @@ def _solve(program: Elastic, session: Session) -> Outcome | None:
         if first is None:
             return None
         converged.append(first)
-        relaxation = Relaxation.current()
-        parameters = Parameters(relaxation.loose, relaxation.valve, relaxation.switching)
-        how = warm(Starts.current().changed_mu, tol=Ends.current().tol)
+        parameters = Parameters(Relaxation.loose, Relaxation.valve, Relaxation.switching)
+        how = warm(Starts.changed_mu, tol=Ends.tol)
         point = schedule.solve("its valves", first, parameters, options=how)
         converged.append(point)
         converged.append(tighten(schedule, fix(schedule, point)))
@@ -205,13 +204,12 @@ def _first(schedule: Schedule, program: Elastic) -> Iterate | None:
     """
     name = f"soft {' and '.join(program.soft)}: relax"
     still = [w for w in program.requirements if w.location[0] not in program.soft]
-    starts = Starts.current()
-    guesses = ((program.requirements, starts.interior_push), (still, starts.changed))
+    guesses = ((program.requirements, Starts.interior_push), (still, Starts.changed))
     for requirements, push in guesses:
         Y = automatic_guess(
             program.model, program.task, requirements, program.layout, program.nodes
         )
-        start, loose = Iterate(program.start(Y)), Parameters(Relaxation.current().loose)
+        start, loose = Iterate(program.start(Y)), Parameters(Relaxation.loose)
         point = schedule.solve(name, start, loose, options=interior(push))
         if point.solved:
             return point

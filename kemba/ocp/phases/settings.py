@@ -3,8 +3,6 @@
 Where no other reason is given, they were chosen by hand on the cases of benchmarks/refine.py.
 """
 
-from kemba.settings import Settings, setting
-
 
 class Reading:
     """How modes are read off an implicit Euler plan."""
@@ -48,14 +46,10 @@ class Elements:
     leeway = 1e-4  # scaled slack beyond what a start needs: off the bounds
 
 
-class Refining(Settings):
+class Refining:
     """How a refinement is solved."""
 
-    iterations: int = setting(
-        800, "1", "of all solves together",
-        "convention: chosen by hand on the cases of benchmarks/refine.py, no comparison kept",
-        decides=True,
-    )  # fmt: skip
+    iterations = 800  # of all solves together
     rough_iterations = 60  # iterations of other solves by either scheme
     elastic_iterations = 200  # iterations of an elastic solve
     # scaled: a plan nearer to its mirror image is solved by half; the certificate's tolerance

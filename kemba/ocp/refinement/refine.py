@@ -136,7 +136,7 @@ class Refiner:
     @property
     def left(self) -> int:
         """Iterations that may still be spent."""
-        return Refining.current().iterations - self.iterations
+        return Refining.iterations - self.iterations
 
     def run(self) -> Refined:
         """The first reading that solves, else how the last one ended."""
@@ -206,21 +206,20 @@ class Refiner:
     ) -> tuple[PhaseProgram, Iterate]:
         """The elastic program of a step: near the start by the coarser scheme, then for the task's
         cost, then for that near the start by the finer scheme."""
-        settings, scheme = Refining.current(), RADAU5 if step == FINEST else RADAU3
-        program, x = self.build(phases, start, scheme, settings.price)
+        scheme = RADAU5 if step == FINEST else RADAU3
+        program, x = self.build(phases, start, scheme, Refining.price)
         if step != BEST:
-            x = program.proximal(x, settings.near_elastic)
-        options = (warm if step == FINEST else rough)(settings.elastic_iterations)
-        options["mu_init"] = settings.elastic_mu / 10**step
+            x = program.proximal(x, Refining.near_elastic)
+        options = (warm if step == FINEST else rough)(Refining.elastic_iterations)
+        options["mu_init"] = Refining.elastic_mu / 10**step
         return program, self._solve(program, program.loosened(x), options)
 
     def exact(self, phases: Sequence[Phase], start: Start) -> Refined:
         """The solution nearest to the plan by the coarser scheme, then the best one by both."""
         program, x = self.build(phases, start, RADAU3)
         self.tell(Stage("phases: near the plan", 1, SOLVES))
-        settings = Refining.current()
-        options = rough(settings.rough_iterations)
-        found = self._solve(program, program.proximal(x, settings.near), options)
+        options = rough(Refining.rough_iterations)
+        found = self._solve(program, program.proximal(x, Refining.near), options)
         if not found.solved:
             return ended(program, found)
         return self.simpler(program, found.Y) or self.finish(program, found.Y)
@@ -239,7 +238,7 @@ class Refiner:
         first."""
         self.tell(Stage("phases: the best plan", 2, SOLVES))
         program, start = self.build(near.phases, self.plan, RADAU3)
-        best = self._solve(program, x[: len(start)], rough(Refining.current().rough_iterations))
+        best = self._solve(program, x[: len(start)], rough(Refining.rough_iterations))
         found = ended(program, best)
         if best.solved:
             simpler = self.simpler(program, best.Y)
@@ -255,10 +254,9 @@ class Refiner:
         """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
         one."""
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
-        settings = Refining.current()
         program, _ = self.build(coarser.phases, self.plan, RADAU5)
         start = carried(program, coarser.columns, coarser.scheme.points, x)
-        found = self._solve(program, start, warm(settings.rough_iterations))
+        found = self._solve(program, start, warm(Refining.rough_iterations))
         if found.solved:
             self.solution = program, found
         return read(program, found)
@@ -331,7 +329,7 @@ def reduction_of(
     half = find_symmetry(model) if task.solver.symmetry else None
     if half is None or not requirements_are_symmetric(model, requirements):
         return whole(model.node)
-    x, mirrored = arrays(model, plan), Refining.current().mirrored
+    x, mirrored = arrays(model, plan), Refining.mirrored
     x["q"] = x["q"] - np.array(model.mechanism.origin)
     for name, matrix in half.B.items():
         mean = half.expand(name, half.restrict(name, x[name]))

@@ -43,7 +43,7 @@ def misfits(program: PhaseProgram, x: np.ndarray) -> list[Misfit]:
 
     With an exact penalty, slacks of modes that fit are zero to the solver's tolerance.
     """
-    found, fits = [], FITS * Refining.current().rough_rows
+    found, fits = [], FITS * Refining.rough_rows
     for soft in program.soft:
         for way, side in ((soft.above, 1), (soft.below, -1)):
             for e, size in zip(soft.elements, x[way], strict=True) if way is not None else ():
@@ -242,7 +242,6 @@ def with_pulses(
 
 def _solved(program: PhaseProgram, start: Iterate, control: Control) -> Solution | None:
     """A program with its solution; None where it has none near."""
-    settings = Refining.current()
-    stagnation = Stagnation(PATIENCE, UNDERWAY, settings.slow)
-    found = solve_along(program, start, warm(settings.rough_iterations), control, stagnation)
+    stagnation = Stagnation(PATIENCE, UNDERWAY, Refining.slow)
+    found = solve_along(program, start, warm(Refining.rough_iterations), control, stagnation)
     return (program, found) if found.solved else None

@@ -133,9 +133,8 @@ def solve(
 ) -> Iterate:
     """The program solved from `start`; given up where the violation stagnates, by default as the
     settings say."""
-    settings = Refining.current()
     own = {**program.task.solver.options, **exact(), **options}
-    longest = settings.stagnation_iterations, settings.stagnation_near, settings.slow
+    longest = Refining.stagnation_iterations, Refining.stagnation_near, Refining.slow
     if program.elastic > 0.0:  # such a program has a solution
         stagnation = Stagnation(np.inf, 0.0)
     stagnation = stagnation or Stagnation(*longest)
@@ -171,28 +170,25 @@ def solve_along(
 
 def exact() -> dict[str, Any]:
     """IPOPT options of the finer scheme."""
-    settings = Refining.current()
     return {
-        "tol": settings.tol,
-        "constr_viol_tol": settings.rows,
+        "tol": Refining.tol,
+        "constr_viol_tol": Refining.rows,
         "acceptable_iter": 0,
-        "mumps_pivtol": settings.pivot,
-        "mumps_permuting_scaling": settings.permuting,
-        "max_hessian_perturbation": settings.hessian,
+        "mumps_pivtol": Refining.pivot,
+        "mumps_permuting_scaling": Refining.permuting,
+        "max_hessian_perturbation": Refining.hessian,
     }
 
 
 def warm(iterations: int) -> dict[str, Any]:
     """IPOPT options of a warm start on primal values, with at most `iterations`."""
-    settings = Refining.current()
-    push = {"bound_push": settings.push, "bound_frac": settings.push}
-    return {"mu_init": settings.mu, **push, "max_iter": iterations}
+    push = {"bound_push": Refining.push, "bound_frac": Refining.push}
+    return {"mu_init": Refining.mu, **push, "max_iter": iterations}
 
 
 def rough(iterations: int) -> dict[str, Any]:
     """The same for the coarser scheme, whose solution is only a start."""
-    settings = Refining.current()
-    return {**warm(iterations), "tol": settings.rough_tol, "constr_viol_tol": settings.rough_rows}
+    return {**warm(iterations), "tol": Refining.rough_tol, "constr_viol_tol": Refining.rough_rows}
 
 
 PHYSICS = ("kinematics", "dynamics", "rate", "impact")  # first words of their rows

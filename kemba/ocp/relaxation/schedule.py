@@ -25,10 +25,9 @@ EXACT_ROWS = 1e-8  # of the last solve: 100 times below the certificate's tolera
 
 def interior(push: float | None = None) -> dict[str, Any]:
     """IPOPT options of a first solve, which starts `push` inside the bounds."""
-    starts = Starts.current()
-    push = starts.interior_push if push is None else push
+    push = Starts.interior_push if push is None else push
     distance = {"bound_push": push, "bound_frac": push}
-    return {**distance, "mu_init": starts.interior_mu, "tol": Ends.current().tol}
+    return {**distance, "mu_init": Starts.interior_mu, "tol": Ends.tol}
 
 
 def exact(mu: float) -> dict[str, Any]:
@@ -36,15 +35,14 @@ def exact(mu: float) -> dict[str, Any]:
 
     Rows are met tightly, since the certificate measures them; the cost needs few digits.
     """
-    tol = Ends.current().exact_tol
+    tol = Ends.exact_tol
     return warm(mu, tol=tol, constr_viol_tol=EXACT_ROWS, acceptable_iter=0)
 
 
 def find(schedule: Schedule, start: Iterate) -> Iterate:
     """From a guess to a plan with binary valves, its pairs still a little loose."""
-    relaxation = Relaxation.current()
-    options = {**interior(), "max_iter": schedule.at_most(Ends.current().relax_iterations)}
-    parameters = Parameters(relaxation.loose, forces=relaxation.forces)
+    options = {**interior(), "max_iter": schedule.at_most(Ends.relax_iterations)}
+    parameters = Parameters(Relaxation.loose, forces=Relaxation.forces)
     point = schedule.solve(RELAX, start, parameters, options=options)
     if point.ending in (Ending.INFEASIBLE, Ending.ITERATION_LIMIT):
         return point  # it would not converge with tighter pairs either
@@ -54,19 +52,20 @@ def find(schedule: Schedule, start: Iterate) -> Iterate:
 def binary(schedule: Schedule, point: Iterate, push: float = WARM_PUSH) -> Iterate:
     """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before; the
     start moves `push` off the bounds."""
-    relaxation, starts, tol = Relaxation.current(), Starts.current(), Ends.current().tol
+    tol = Ends.tol
     parameters = valve_parameters()
-    options = warm(starts.changed_mu, push, tol=tol)
+    options = warm(Starts.changed_mu, push, tol=tol)
     point = schedule.solve("binary valves", point, parameters, options=options)
-    options, fixed = warm(starts.rounded_mu, starts.rounded, tol=tol), schedule.valves(point)
-    parameters = Parameters(relaxation.loose, forces=relaxation.forces)
+    options, fixed = warm(Starts.rounded_mu, Starts.rounded, tol=tol), schedule.valves(point)
+    parameters = Parameters(Relaxation.loose, forces=Relaxation.forces)
     return schedule.solve("round valves", point, parameters, options=options, fixed=fixed)
 
 
 def valve_parameters() -> Parameters:
     """Loose pairs and a cost that pushes valves towards 0 and 1."""
-    r = Relaxation.current()
-    return Parameters(r.loose, r.valve, r.switching, forces=r.forces)
+    return Parameters(
+        Relaxation.loose, Relaxation.valve, Relaxation.switching, forces=Relaxation.forces
+    )
 
 
 def fix(
@@ -78,10 +77,9 @@ def fix(
 ) -> Iterate:
     """Round and fix the valves, the pairs tighter; `forces` is the weight of squared forces,
     `more` are options of IPOPT."""
-    relaxation, starts = Relaxation.current(), Starts.current()
-    options = warm(starts.changed_mu, starts.changed, tol=Ends.current().tol, **more)
-    weight = relaxation.forces if forces is None else forces
-    parameters, fixed = Parameters(relaxation.tight, forces=weight), schedule.valves(point)
+    options = warm(Starts.changed_mu, Starts.changed, tol=Ends.tol, **more)
+    weight = Relaxation.forces if forces is None else forces
+    parameters, fixed = Parameters(Relaxation.tight, forces=weight), schedule.valves(point)
     return schedule.solve(
         "fix valves", point, parameters, options=options, fixed=fixed, stagnation=stagnation
     )
@@ -89,22 +87,20 @@ def fix(
 
 def tighten(schedule: Schedule, point: Iterate) -> Iterate:
     """Tighten the pairs to what the certificate asks, with the valves fixed."""
-    relaxation = Relaxation.current()
-    eps = relaxation.margin * schedule.final_eps
-    parameters = Parameters(eps, proximal=relaxation.proximal)
-    options, fixed = exact(Starts.current().tighten_mu), schedule.valves(point)
+    eps = Relaxation.margin * schedule.final_eps
+    parameters = Parameters(eps, proximal=Relaxation.proximal)
+    options, fixed = exact(Starts.tighten_mu), schedule.valves(point)
     return schedule.solve("tighten", point, parameters, options=options, fixed=fixed)
 
 
 def move(schedule: Schedule, start: Iterate, eps: float | None = None, **more: Any) -> Iterate:
     """Release every valve switch by a few nodes and push the valves towards 0 and 1 again, the
     pairs relaxed by `eps`; `more` are options of IPOPT."""
-    relaxation, starts = Relaxation.current(), Starts.current()
-    eps = relaxation.tight if eps is None else eps
-    options = {**warm(starts.changed_mu, starts.changed, tol=Ends.current().tol), **more}
+    eps = Relaxation.tight if eps is None else eps
+    options = {**warm(Starts.changed_mu, Starts.changed, tol=Ends.tol), **more}
     free = _released(schedule.valves(start))
     parameters = Parameters(
-        eps, relaxation.valve, relaxation.switching_moved, forces=relaxation.forces
+        eps, Relaxation.valve, Relaxation.switching_moved, forces=Relaxation.forces
     )
     return schedule.solve("move switches", Iterate(start.Y), parameters, options=options, free=free)
 
@@ -125,14 +121,13 @@ def refine_grid(schedule: Schedule, coarse: Transcription, point: Iterate) -> It
 
     Where that takes too long, the valves do not fit the finer grid, and are sought again there.
     """
-    ends = Ends.current()
     start = Iterate(prolong(coarse, schedule.transcription, point.Y))
-    longest = schedule.at_most(ends.misfit_iterations)
-    stagnation = Stagnation(ends.stagnation_iterations, ends.stagnation_near)
+    longest = schedule.at_most(Ends.misfit_iterations)
+    stagnation = Stagnation(Ends.stagnation_iterations, Ends.stagnation_near)
     kept = fix(schedule, start, forces=0.0, stagnation=stagnation, max_iter=longest)
     if kept.solved:
         return kept
-    return fix(schedule, binary(schedule, start, Starts.current().changed), forces=0.0)
+    return fix(schedule, binary(schedule, start, Starts.changed), forces=0.0)
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
@@ -186,7 +181,7 @@ def confirm(schedule: Schedule, half: Transcription, point: Iterate) -> Iterate:
     """
     whole = schedule.transcription
     start = replace(point, Y=widen(half, whole, point.Y), lam_x=None, lam_g=None)
-    parameters = Parameters(Relaxation.current().margin * schedule.final_eps)
+    parameters = Parameters(Relaxation.margin * schedule.final_eps)
     g = np.array(whole.problem.g(start.Y.ravel(), parameters.vector(whole.nodes))).ravel()
     if violation(whole, g) <= CONFIRMED and point.ending is not None:
         schedule.attempts.append(Attempt("confirmed on the whole robot", point.ending, 0))
@@ -202,15 +197,15 @@ def grow(schedule: Schedule, half: Transcription, point: Iterate, guess: Iterate
     All switches are released by a few nodes, and rounded again. Coordinates that are zero by
     symmetry, such as the way forward, start from `guess`.
     """
-    whole, starts, ends = schedule.transcription, Starts.current(), Ends.current()
+    whole = schedule.transcription
     Y = widen(half, whole, point.Y)
     lost = np.flatnonzero(~half.layout.reduction.B["q"].any(axis=1))
     for group in ("q", "v"):
         columns = whole.layout.slices[group].start + lost
         Y[:, columns] = guess.Y[:, columns]
-    longest = schedule.at_most(ends.relax_iterations)
-    options = warm(starts.rounded_mu, starts.rounded, max_iter=longest)
-    moved = move(schedule, Iterate(Y), Relaxation.current().loose, **options)
+    longest = schedule.at_most(Ends.relax_iterations)
+    options = warm(Starts.rounded_mu, Starts.rounded, max_iter=longest)
+    moved = move(schedule, Iterate(Y), Relaxation.loose, **options)
     return fix(schedule, moved) if moved.solved else moved
 
 

@@ -1,17 +1,14 @@
-"""Settings of the schedule: what each solve asks, and when one gives up. See docs/solving.md."""
+"""Figures of the schedule: what each solve asks, and when one gives up. See docs/solving.md.
 
-from kemba.settings import CHOSEN, Settings, setting
-
-# Numbers without a reason of their own were chosen by hand, or by the trials of docs/solving.md on
-# the jumps of configs/sweeps/reliability.yaml, whose code was not kept.
-VARIANTS = "tuned: benchmarks/variants.py"
+Those without a reason of their own were chosen by hand, or by the trials of docs/solving.md on the
+jumps of configs/sweeps/reliability.yaml, whose code was not kept.
+"""
 
 
-class Relaxation(Settings):
+class Relaxation:
     """How far the pairs are relaxed, and what the cost holds beside the task's own."""
 
-    # of the pairs while valves are sought
-    loose: float = setting(1e-3, "body weights x m (or m/s)", "relaxation", CHOSEN, decides=True)
+    loose = 1e-3  # body weights times m (or m/s), relaxation of the pairs while valves are sought
     tight = 1e-4  # relaxation of the pairs once valves are fixed
     margin = 0.8  # the last one, as a part of what is certified: room for IPOPT's own tolerance
     valve = 0.1  # weight of u (1 - u), per valve and node of the grid's mean
@@ -21,41 +18,29 @@ class Relaxation(Settings):
     proximal = 3e-4  # weight of half the squared distance from the start in the last solve
 
 
-class Starts(Settings):
+class Starts:
     """Where each solve starts: barrier parameters and distances from the bounds."""
 
     interior_push = 0.3  # bound_push and bound_frac of the first solve; 0.5 is the middle
     interior_mu = 0.1  # barrier parameter of the first solve, IPOPT's default
     rounded = 1e-2  # distance from the bounds after rounding, which leaves plans far from feasible
     rounded_mu = 1e-2  # barrier parameter after rounding
-    changed: float = setting(
-        1e-3, "1", "distance from the bounds after valves were released or the grid refined",
-        VARIANTS, decides=True,
-    )  # fmt: skip
+    # distance from the bounds after valves were released or the grid refined, by
+    # benchmarks/variants.py
+    changed = 1e-3
     changed_mu = 1e-3  # barrier parameter after that
     tighten_mu = 1e-5  # barrier parameter of the last solve
 
 
-class Ends(Settings):
+class Ends:
     """When a solve of the schedule is done, and when it is given up."""
 
-    tol: float = setting(
-        1e-3, "1", "IPOPT's tolerance while valves are sought; these plans are changed again",
-        CHOSEN, decides=True,
-    )  # fmt: skip
+    tol = 1e-3  # IPOPT's tolerance while valves are sought; these plans are changed again
     exact_tol = 1e-2  # IPOPT's tolerance of the last solve: a few digits of the cost
-    relax_iterations: int = setting(
-        600, "1", "limit of the first solve; where there is a plan it takes 30 to 200",
-        "derived: three times the longest seen", decides=True,
-    )  # fmt: skip
-    misfit_iterations: int = setting(
-        200, "1", "limit of the first solve on a finer grid; valves that fit take 20 to 100",
-        "derived: twice the longest seen", decides=True,
-    )  # fmt: skip
-    stagnation_iterations: int = setting(
-        40, "1", "iterations without a smaller violation, after which a finer grid's valves do not "
-        "fit", CHOSEN, decides=True,
-    )  # fmt: skip
+    relax_iterations = 600  # limit of the first solve; where there is a plan it takes 30 to 200
+    misfit_iterations = 200  # the same on a finer grid; valves that fit take 20 to 100
+    # iterations without a smaller violation, after which a finer grid's valves do not fit
+    stagnation_iterations = 40
     stagnation_near = 0.05  # scaled violation from which the next solve may begin
 
 
