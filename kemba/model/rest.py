@@ -19,7 +19,7 @@ from kemba.quantity import Quantity
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-class Columns(Protocol):
+class ByName(Protocol):
     """Values (n,) by name."""
 
     def __contains__(self, name: str, /) -> bool: ...
@@ -129,7 +129,7 @@ def at_rest(model: Model, q: Any, u: Any) -> Array:
     return _KNOWN[model](q, u)
 
 
-def told_by(model: Model, s: Array, plan: Columns) -> dict[int, Array]:
+def told_by(model: Model, s: Array, plan: ByName) -> dict[int, Array]:
     """Effect states (n,), by their number, that follow from what a plan has of the model's outputs:
     the pressure of a chamber from its force. Outputs are linear in such a state; `s` (ns,): where
     the slope is taken. States that the plan itself has are left out."""
