@@ -41,9 +41,6 @@ def characterise(
             help="Supply of logs that do not tell it, such as '0.6 MPa'; may be repeated."
         ),
     ] = None,
-    paper: Annotated[
-        bool, typer.Option("--paper", help="Use the paper's own tables instead of logs.")
-    ] = False,
     force: Force = False,
     own_effects: OwnEffects = None,
     json: Json = False,
@@ -55,11 +52,8 @@ def characterise(
 
     Example: kemba-opt characterise bench/locked bench/dynamometer --out cylinder.yaml
     """
-    if paper:
-        _print_paper(json, quiet)
-        return
     if not logs:
-        raise typer.BadParameter("logs are missing: give CSV files, or --paper", param_hint="LOGS")
+        raise typer.BadParameter("logs are missing: give CSV files", param_hint="LOGS")
     from kemba.folders import fresh
     from kemba.model import load_model
 
@@ -149,24 +143,6 @@ def _own_rig(
         say(f"{name} differs between runs; its interval spans them", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
     say_next(after_model(out, True, logs) if out else "", quiet)
-
-
-def _print_paper(json: bool, quiet: bool) -> None:
-    """Tables I and II of the paper against pressure times area and volume."""
-    from rich.table import Table
-
-    from kemba.identify.published import LOSS_COLUMNS, published
-
-    found = published()
-    if json:
-        print_json(found.json())
-        return
-    typer.echo(found.sentence)
-    table = Table("mode", *LOSS_COLUMNS, title="Pressure x area - F_static, N", box=None)
-    for mode, losses in found.losses.items():
-        table.add_row(mode, *(f"{loss:.1f}" for loss in losses))
-    if not quiet:
-        results().print(table)
 
 
 def _draw(

@@ -18,7 +18,6 @@ from kemba.identify.bench.problem import bench_problem
 from kemba.identify.design.rig import propose
 from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings
 from kemba.identify.infer.linear import Linear, estimate, names_of, priors
-from kemba.identify.published import published
 from kemba.identify.workflow import discover_logs
 from kemba.model.spec import load_model, load_spec
 from kemba.plant.commands import Profile
@@ -185,12 +184,3 @@ def test_from_logs_to_a_model_and_the_next_test(bench_log: BenchLog, tmp_path: P
     ):
         proposal = propose(out, tmp_path / "next.yaml")
     assert proposal.nats > 0 and (tmp_path / "next.yaml").is_file()
-
-
-def test_the_papers_tables_tell_of_friction_supply_and_tubes() -> None:
-    found = published()
-    low, high = found.seal_friction
-    assert 5.5 < low < high < 8.5
-    assert found.losses["both"] == pytest.approx([6.1, 5.0, 7.8], abs=0.05)
-    assert all(s[-1] > 0.08 > 0.01 > s[0] for s in found.shortfall.values())
-    assert all(16e-6 < v < 19e-6 for v in found.dead_volume.values())
