@@ -10,12 +10,13 @@ rig as the paper's Fig. 3, 4, 6 and 7 do, with the fitted model in the last.
 import argparse
 from pathlib import Path
 
-from kemba.identify import published as tables
+from kemba.identify.published import as_json
 from kemba.plant.characterise import characterise
 from kemba.plant.rigs import bench_model, load_rig, run_rig
 from kemba.plotting import plot_rig
 from kemba.plotting.style import save_figure
 from kemba.trajectory import Trajectory
+from kemba_cli.verbs.characterise import tables
 
 RIGS = ("locked", "volumes", "dynamometer", "random")
 
@@ -25,11 +26,7 @@ def main(model: str, figures: Path | None) -> None:
     told = (name for name in RIGS if name != "volumes")  # the same tests as `locked`, in between
     logs = {f"{n}/{test}": log for n in told for test, log in data[n].items()}
     found = characterise(logs, bench_model(model, 0.7e6).mechanism.need_cylinder())
-    for columns, rows in (
-        (tables.RISE_COLUMNS, tables.rise_rows(found)),
-        (tables.FORCE_COLUMNS, tables.force_rows(found)),
-        (tables.CHECK_COLUMNS, tables.check_rows(found)),
-    ):
+    for _, columns, rows in tables(as_json(found)):
         print()
         for row in (columns, *rows):
             print(" | ".join(row))

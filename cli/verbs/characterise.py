@@ -163,15 +163,12 @@ def _draw(
 
 
 def _print(found: Characteristics) -> None:
+    """Tables I and II beside the paper's, with 95 % intervals, and how well eq. 4 to 7 predict."""
     from rich.table import Table
 
-    from kemba.identify import published as tables
+    from kemba.identify.published import as_json
 
-    for title, columns, rows in (
-        ("Chamber force rise time", tables.RISE_COLUMNS, tables.rise_rows(found)),
-        ("Steady state: F = F_static - c_d v", tables.FORCE_COLUMNS, tables.force_rows(found)),
-        ("Fitted model against logs", tables.CHECK_COLUMNS, tables.check_rows(found)),
-    ):
+    for title, columns, rows in tables(as_json(found)):
         if rows:
             table = Table(title=title, title_justify="left", box=None)
             for number, column in enumerate(columns):
@@ -179,3 +176,36 @@ def _print(found: Characteristics) -> None:
             for row in rows:
                 table.add_row(*row)
             results().print(table)
+
+
+def tables(told: dict[str, Any]) -> list[tuple[str, list[str], list[list[str]]]]:
+    """What was found as text: title, columns and rows of each table."""
+
+    def cell(value: float | None, scale: float = 1.0, digits: int = 0) -> str:
+        return "" if value is None else f"{round(scale * value, digits) + 0.0:.{digits}f}"
+
+    def found(one: dict[str, Any], scale: float, digits: int) -> list[str]:
+        """A value, half its interval where there are data for one, the paper's value."""
+        half = 0.5 * (one["high"] - one["low"]) if one["low"] == one["low"] else None
+        values = cell(one["value"], scale, digits), cell(half, scale, max(digits, 1))
+        return [*values, cell(one["paper"], scale)]
+
+    dead = told["dead_time"].items()
+    rises = [[r["chamber"], cell(r["x_m"], 1e3), *found(r, 1e3, 1)] for r in told["table_1"]]
+    rises += [[f"dead time {name}", "", *found(one, 1e3, 2)] for name, one in dead]
+    forces = [
+        [line["mode"], cell(line["supply_pa"], 1e-6, 1), *found(line["F_static"], 1.0, 0),
+         *found(line["c_d"], 1.0, 0), cell(line["r2"], 1.0, 3)]
+        for line in told["table_2"]
+    ]  # fmt: skip
+    checks = [
+        [name, cell(one["r2"], 1.0, 4), cell(one["rms_n"], 1.0, 1)]
+        for name, one in told["check"].items()
+    ]
+    of = ["+-95 %", "paper"]
+    line = ["mode", "supply MPa", "F_static N", *of, "c_d N s/m", *of, "R2"]
+    return [
+        ("Chamber force rise time", ["chamber", "x mm", "rise time ms", *of], rises),
+        ("Steady state: F = F_static - c_d v", line, forces),
+        ("Fitted model against logs", ["log", "R2", "RMS N"], checks),
+    ]

@@ -1,4 +1,4 @@
-"""Tables I and II as text and JSON, beside the paper's."""
+"""Tables I and II beside the paper's."""
 
 from typing import Any
 
@@ -50,42 +50,6 @@ def as_json(found: Characteristics) -> dict[str, Any]:
     }
 
 
-RISE_COLUMNS = ("chamber", "x mm", "rise time ms", "+-95 %", "paper")
-FORCE_COLUMNS = (
-    *("mode", "supply MPa", "F_static N", "+-95 %", "paper"),
-    *("c_d N s/m", "+-95 %", "paper", "R2"),
-)
-CHECK_COLUMNS = ("log", "R2", "RMS N")
-
-
-def rise_rows(found: Characteristics) -> list[tuple[str, ...]]:
-    """Table I and the dead times; columns as in `RISE_COLUMNS`."""
-    rows: list[tuple[str, ...]] = [
-        (name, _text(1e3 * x), _text(1e3 * e.value, 1), _width(e, 1e3, 1), _text(1e3 * paper))
-        for name, x, e, paper in _rises(found)
-    ]
-    for name, e in found.rises.dead.items() if found.rises else ():
-        paper = _text(1e3 * PAPER_DEAD_TIME)
-        rows.append((f"dead time {name}", "", _text(1e3 * e.value, 2), _width(e, 1e3, 2), paper))
-    return rows
-
-
-def force_rows(found: Characteristics) -> list[tuple[str, ...]]:
-    """Table II; columns as in `FORCE_COLUMNS`."""
-    rows: list[tuple[str, ...]] = []
-    for line, (force, damping) in _forces(found):
-        F, c = line.F_static, line.c_d
-        left = (line.mode, _text(line.supply / 1e6, 1), _text(F.value), _width(F, 1.0, 1))
-        right = (_text(c.value), _width(c, 1.0, 1), _text(damping), _text(line.r2, 3))
-        rows.append((*left, _text(force), *right))
-    return rows
-
-
-def check_rows(found: Characteristics) -> list[tuple[str, ...]]:
-    """How well the fitted model predicts moving logs; columns as in `CHECK_COLUMNS`."""
-    return [(name, _text(r2, 4), _text(rms, 1)) for name, (r2, rms) in found.check.items()]
-
-
 def _rises(found: Characteristics) -> list[tuple[str, float, Estimate, float]]:
     if not found.rises:
         return []
@@ -103,12 +67,3 @@ def _forces(found: Characteristics) -> list[tuple[Any, tuple[float | None, float
         (line, PAPER_FORCE.get((line.mode, round(line.supply, -3)), (None, None)))
         for line in found.lines
     ]
-
-
-def _text(value: float | None, digits: int = 0) -> str:
-    return "" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"
-
-
-def _width(e: Estimate, scale: float, digits: int) -> str:
-    """Half the interval; nothing where the data are too few."""
-    return _text(0.5 * scale * (e.high - e.low), digits) if e.low == e.low else ""

