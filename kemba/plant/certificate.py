@@ -87,7 +87,6 @@ def executions(
     controller: Trajectory,
     plant: str | Model | None = PLANT,
     tell: Tell = silent,
-    table: Replay | None = None,
 ) -> dict[str, Replay | None]:
     """The executions `replay`, `table_replay` and `plant_replay` of the certificate.
 
@@ -95,8 +94,7 @@ def executions(
     through eq. 10 and the dead time on the same model, `plant_replay` that table on the plant, None
     without one. With the table a plan that ends standing, with its valves closed, has a moment to
     come to rest before its landing is judged. Any is None where a plan that was not solved cannot
-    even be started. `tell` gets the name of each execution; `table` is that of the controller's
-    table on `model`, where it was executed before.
+    even be started. `tell` gets the name of each execution.
     """
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
@@ -113,7 +111,7 @@ def executions(
     tell(Stage("replay: the plan's inputs", 1, 3))
     own = _tried(lambda: replay(model, plan))
     tell(Stage("replay: controller.csv", 2, 3))
-    table = table or on(model)
+    table = on(model)
     tell(Stage("replay: controller.csv on the simulated robot", 3, 3))
     return {"replay": own, "table_replay": table, "plant_replay": on(full) if full else None}
 

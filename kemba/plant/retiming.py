@@ -1,32 +1,24 @@
-"""Valve edges moved until an execution lands where the plan does.
+"""Valve edges of a table moved by ticks until an execution is near enough to what is wanted.
 
-Rounding an edge to a tick of 1 ms can move the apex of a light robot by a centimetre. Which
-rounding is best depends on the whole motion, so the table is simulated with other roundings.
+What an edge does to each error is seen by an execution with it moved by a tick. What several would
+do together is the sum of these; the best sums are executed.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import combinations, product
 from math import comb
 
 import numpy as np
 
-from kemba.errors import KembaError
-from kemba.events import PLANNED, read
-from kemba.model import Model
-from kemba.plant.certificate import begins_moving, moving_start, rest_after
-from kemba.plant.controller import execute
 from kemba.plant.kernel.machine import Array
-from kemba.plant.replay import Replay
 from kemba.trajectory import Trajectory
 
 Edges = dict[str, list[int]]  # by valve column: ticks at which it opens, closes, opens ...
 Group = list[tuple[str, int]]  # edges that move together: column, and which of its edges
 
 
-# groups of edges that move by a tick at once: a jump of 0.487 m has no near table with three
-# (benchmarks/retiming.py)
+# groups of edges that move by a tick at once: of a jump of 0.487 m no table with three was near
 TOGETHER = 4
 FAR = 2  # of which so many may move by two ticks
 # moves of so many groups at most, else of fewer at once: they take 10 ms to compare, a third of an
@@ -90,18 +82,6 @@ def with_moved(
     return Trajectory(table.time, columns, table.meta)
 
 
-class RetimingSettings:
-    """How long other roundings of a table are tried, and which errors need no search."""
-
-    apex = 0.5e-3  # m
-    touchdown = 1e-3  # s: a tick
-    final = 0.01  # m, of the end
-    # simulations at most: edges on ticks of the plan cost as much; of 30 tables 17 took 2 to 24
-    # (benchmarks/retiming.py)
-    executions = 24
-
-
-AHEAD = 1e-3  # m; error of the place ahead, at the planned apex's time, that needs no search
 FALLEN = 1e3  # error of a robot that falls, in units of those: beyond any other
 # predicted error at which a table is tried before the effects of all edges are known: below 1 by
 # what predictions miss
@@ -111,12 +91,10 @@ PRICE = 0.03  # predicted error that a tick counts as: of equal predictions fewe
 
 @dataclass(frozen=True)
 class ExecutedTable:
-    """A table; its execution, None where it cannot be simulated; errors (3 k,) of apex, touchdown
-    and place ahead of each of k flights, and the largest of all errors, in units of
-    `RetimingSettings`."""
+    """A table, the errors (k,) of its execution and the largest of them, in units of what is near
+    enough."""
 
     table: Trajectory
-    replay: Replay | None
     signed: Array
     error: float
 
@@ -125,19 +103,6 @@ class ExecutedTable:
         """Whether it can be compared with others: it was simulated, and falls only where the plan
         does."""
         return self.error < FALLEN
-
-
-def retimed(model: Model, plan: Trajectory, table: Trajectory) -> ExecutedTable:
-    """The table, or one with edges some ticks away whose execution on `model` is nearer to the
-    plan; with that execution.
-
-    What an edge does to each apex, touchdown and place ahead is seen by an execution with it moved
-    by a tick. What several would do together is the sum of these; the best sums are executed.
-    Errors are in units of `RetimingSettings`.
-    """
-    run = partial(executed_table, model, plan, extra=rest_after(model, plan, table))
-    search = Roundings(run, RetimingSettings.executions)
-    return search.best(table, _last(model, plan))
 
 
 @dataclass
@@ -221,47 +186,6 @@ class _Effects:
             self.slopes[alone] = signed - self.start
         if np.abs(signed).max() < np.abs(self.nearest).max():
             self.nearest, self.there = signed, ticks
-
-
-def executed_table(
-    model: Model, plan: Trajectory, table: Trajectory, extra: float
-) -> ExecutedTable:
-    """A table of a plan executed on `model`; its last commands stay for `extra` [s]."""
-    try:
-        start = moving_start(model, plan) if begins_moving(model, plan) else None
-        facts = execute(table, model, extra=extra, start=start).against(model, plan)
-    except KembaError:
-        return ExecutedTable(table, None, np.full(3, np.inf), np.inf)
-    signed = _errors(plan, facts) / np.array(
-        [RetimingSettings.apex, RetimingSettings.touchdown, AHEAD]
-    )
-    error = float(max(np.abs(signed).max(), abs(facts.final_error_m) / RetimingSettings.final))
-    return ExecutedTable(table, facts, signed.ravel(), error + (0.0 if facts.landed else FALLEN))
-
-
-def _errors(plan: Trajectory, done: Replay) -> Array:
-    """Of every planned flight (k, 3) the errors of apex [m], landing [s] and place ahead [m] at the
-    time of the planned apex; of the highest point where there is none."""
-    clock, top = plan.time - plan.time[0], int(np.argmax(plan["body/z"]))
-    flown = [(e.time, e.height_error_m) for e in done.compared.events if e.kind == "apex"]
-    found, real = [], done.trajectory
-    for time, higher in flown or [(float(clock[top]), done.apex_error_m)]:
-        late = (one.late for one in done.compared.landings() if one.planned > time)
-        there, planned = (
-            float(np.interp(time, t, motion["body/x"]))
-            for t, motion in ((real.time, real), (clock, plan))
-        )
-        found.append([higher or 0.0, next(late, 0.0), there - planned])
-    return np.array(found)
-
-
-def _last(model: Model, plan: Trajectory) -> float:
-    """When [s] the last flight of a plan ends, or is highest where it does not land: later edges
-    change neither apex nor touchdown."""
-    course = read(plan, PLANNED, model.mechanism.weight, plan.time - plan.time[0])
-    last = course.flights[-1:]
-    top = (course.apex(last[0]) if last else None) or course.top
-    return last[0].end if last and last[0].end < np.inf else top[0]
 
 
 def _earliest(table: Trajectory, group: Group) -> float:

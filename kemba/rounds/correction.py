@@ -194,7 +194,7 @@ class Aim:
         try:
             flight, lands = self.expected(table, rest)
         except KembaError:
-            return ExecutedTable(table, None, np.full(3, inf), inf)
+            return ExecutedTable(table, np.full(3, inf), inf)
         late, turned = flight.touchdown - wanted.touchdown, flight.pitch - wanted.pitch
         signed = np.array([flight.apex - wanted.apex, late, turned])
         signed /= [AimSettings.apex, AimSettings.touchdown, turn]
@@ -203,10 +203,10 @@ class Aim:
         moved = _moved(first, table).values()
         far = any(abs(k) > AimSettings.moved for ticks in moved for k in ticks)
         if far or (must and not lands) or not np.isfinite(signed).all():
-            return ExecutedTable(table, None, signed, FALLEN)
+            return ExecutedTable(table, signed, FALLEN)
         turns = abs(signed[2]) > 1.0 + 1e-9
         error = float(np.abs(signed[:2]).max())
-        return ExecutedTable(table, None, signed, error + (TURNED if turns else 0.0))
+        return ExecutedTable(table, signed, error + (TURNED if turns else 0.0))
 
 
 def _moved(first: Trajectory, table: Trajectory) -> dict[str, list[int]]:

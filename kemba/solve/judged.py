@@ -12,7 +12,6 @@ from kemba.ocp.certificate.asked import MeasuredRequirement, on_execution
 from kemba.plant.certificate import executions, plant_run, summaries
 from kemba.plant.repeat import counterpart
 from kemba.plant.replay import Replay
-from kemba.plant.retiming import ExecutedTable, retimed
 from kemba.plant.strides import Stability, stability
 from kemba.solve.truth import PLANT, ApexBand, Truth, band_of, beyond, truth_of
 from kemba.solve.verdict import EXECUTIONS, Allowed, Verdict, allowances, judge
@@ -104,27 +103,19 @@ def plant_of(task: Task) -> Model:
     )
 
 
-def table_of(found: Plan) -> ExecutedTable:
-    """The controller's table of a plan, its valve edges moved by ticks where that helps."""
-    table = controller_table(found.model, found.trajectory, found.task.hold)
-    return retimed(found.model, found.trajectory, table)
-
-
 def judged(
     found: Plan,
     table: Trajectory,
     plant: Model | None = None,
     tell: Tell = silent,
-    known: Replay | None = None,
 ) -> Judged:
     """Execute a plan and its table, on its model and on the plant, and judge them by its task.
 
-    `plant`: that of the task when None. `known`: the table's execution on the plan's model, where
-    there was one. Raises KembaError where the plant cannot be built.
+    `plant`: that of the task when None. Raises KembaError where the plant cannot be built.
     """
     model, plan, task = found.model, found.trajectory, found.task
     machine = plant or plant_of(task)
-    done = executions(model, plan, table, machine, tell, known)
+    done = executions(model, plan, table, machine, tell)
     facts = summaries(model, done)
     stable: Stability | None = None
     if task.periodic is not None:

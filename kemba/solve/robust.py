@@ -10,13 +10,13 @@ import numpy as np
 
 from kemba.effects.mechanics.ground import Contact
 from kemba.model import Model
-from kemba.ocp import Plan, Task
+from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.asked import grip_of
 from kemba.ocp.certificate.status import Status
 from kemba.plant.equations import share_equations
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share_of
-from kemba.solve.judged import judged, plant_of, table_of
+from kemba.solve.judged import judged, plant_of
 from kemba.solve.trial import Trial
 from kemba.trajectory import Trajectory
 
@@ -125,9 +125,9 @@ class _Search:
         own = found.task.hold
         for hold in sorted({own, max(own, HOLD)}):
             held = replace(found, task=found.task.model_copy(update={"hold": hold}))
-            near = table_of(held)
-            good = judged(held, near.table, self.plant, known=near.replay).good
-            one = RobustCandidate(held, f"{name}, hold {hold:g} s", near.table, (), good)
+            table = controller_table(held.model, held.trajectory, hold)
+            good = judged(held, table, self.plant).good
+            one = RobustCandidate(held, f"{name}, hold {hold:g} s", table, (), good)
             one = self._executed(one, FEW)
             if one.landed == 1.0:
                 one = self._executed(one, len(self.cases))

@@ -11,7 +11,6 @@ from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, carried_over, lacking
-from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
 from kemba.scenarios.share import Share
 from kemba.solve.judged import Judged, judged
@@ -117,14 +116,9 @@ def executed(
     if table is None or not execution.replay or not found.status.plan:
         return Trial(found, result, Motions(table), repair=repair)
     wait_for_compiler(execution.tell)
-    execution.tell("replay: the times of controller.csv")
-    known = None
-    if share is None:
-        near = retimed(found.model, found.trajectory, table)
-        table, known = near.table, near.replay
     trial = Trial(found, result, Motions(table), repair=repair)
     try:
-        done = judged(found, table, tell=execution.tell, known=known)
+        done = judged(found, table, tell=execution.tell)
         trial = confirmed(replace(trial, judged=done), execution.place)
     except KembaError as error:  # a model that the simulator cannot execute still has its plan
         result |= _unconfirmed(found, f"it cannot be simulated: {error}")

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from kemba.errors import ConfigErrors
-from kemba.ocp import Plan, load_task
+from kemba.ocp import Plan, controller_table, load_task
 from kemba.ocp.certificate.asked import grip_of
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plan
 from kemba.ocp.reading import asked_of
 from kemba.plant.controller import execute
-from kemba.solve.judged import judged, plant_of, table_of
+from kemba.solve.judged import judged, plant_of
+from kemba.trajectory import Trajectory
 
 
 @cache
@@ -31,11 +32,15 @@ def test_a_plan_keeps_to_its_share_of_the_friction() -> None:
     assert cost[0] < cost[1]
 
 
+def table_of(found: Plan) -> Trajectory:
+    return controller_table(found.model, found.trajectory, found.task.hold)
+
+
 def test_it_is_planned_and_judged_on_the_ground_of_its_model() -> None:
     found = high(0.5)
     assert found.model.effect("contact").value("mu") == 1.0
     assert plant_of(found.task).effect("contact").value("mu") == 1.0
-    assert judged(found, table_of(found).table).replays
+    assert judged(found, table_of(found)).verdicts["replay"].good
 
 
 @pytest.mark.parametrize(("grip", "slips"), [(1.0, True), (0.5, False)])
@@ -43,7 +48,7 @@ def test_it_does_not_slip_where_the_ground_has_no_more(grip: float, slips: bool)
     """On the planning model with half the friction, up to the take-off."""
     found = high(grip)
     ground = found.model.effect("contact").bind({"mu": 0.52})
-    done = execute(table_of(found).table, found.model.with_effects([ground])).trajectory
+    done = execute(table_of(found), found.model.with_effects([ground])).trajectory
     push = (done.time > 0.0) & (done.time < 0.14)
     feet = np.concatenate([done[f"{leg}/foot/vx"][push] for leg in ("front", "rear")])
     assert (np.abs(feet).max() > 0.05) == slips
