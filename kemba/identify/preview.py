@@ -58,8 +58,6 @@ def preview(
     search = Search(problem, say=tell)
     search.prepare()
     told = what_shows(search, null_test(search))
-    tests = []
-    for group in told.alike:
-        tell(f"standard tests for {' and '.join(group)}")
-        tests.append(splitting_test(model, problem, group))
+    tell("standard tests for what looks alike")
+    tests = [splitting_test(model, problem, group) for group in told.alike]
     return Preview(told, {e: c.lead for e, c in problem.candidates.items()}, tests)

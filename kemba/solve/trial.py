@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from kemba.errors import KembaError, enumerated
-from kemba.model import Model, load_spec
+from kemba.model import load_spec
 from kemba.model.lags import with_lags
 from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.status import Status
@@ -151,7 +151,8 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
     if alike := carried_over(task.model, task.payload):
         names.append(f"the plant has {enumerated(alike)}, too")
-    if done.replays and not done.good and lags_only(found.model, task.plant):
+    lags = with_lags(found.model) is None and load_spec(task.plant).chambers == "orifice"
+    if lags and done.replays and not done.good:
         names.append(AIR)
     facts: dict[str, Any] = {"verdict_on": done.truth.on}
     facts |= {"band": done.band.json() if done.band else None}
@@ -159,11 +160,6 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
     if done.good:
         return {**facts, "sentence": "; ".join([sentence_of(found), *names, *done.remarks])}
     return facts | _unconfirmed(found, " and ".join(done.causes), [*names, *done.remarks])
-
-
-def lags_only(model: Model, plant: str) -> bool:
-    """Whether a model has first-order chambers where the plant has physical ones."""
-    return with_lags(model) is None and (load_spec(plant).chambers == "orifice")
 
 
 def _unconfirmed(found: Plan, cause: str, remarks: Sequence[str] = ()) -> dict[str, Any]:

@@ -38,11 +38,12 @@ class Along:
 def add_missed(program: PhaseProgram, x: np.ndarray) -> bool:
     """Add rows at the places between nodes where the solution x (size,) misses what holds along the
     motion; whether there were any."""
-    view, added = View(program), False
+    view, c, added = View(program), program.columns, False
     for asked in list(_along(program, view)):
         for share in SHARES:
             z, g = _at(program, view, asked.g, share)
-            columns = np.array([_columns(program, e) for e in asked.elements])
+            ends = ((c.end(e), c.end(e + 1), c.h[c.phase_of[e]]) for e in asked.elements)
+            columns = np.array([np.concatenate([a["q"], b["q"], b["v"], h]) for a, b, h in ends])
             f = ca.Function("g", [z], [ca.densify(g)])
             values = np.array(f.map(len(columns))(x[columns].T)).ravel()
             over = np.maximum(asked.low - values, values - asked.high)
@@ -81,10 +82,3 @@ def _at(program: PhaseProgram, view: View, g: ca.SX, share: float) -> tuple[ca.S
     step = h * STEP * v1 * scale["v"] / scale["q"]
     q = q1 - left * step + left**2 * (q0 - q1 + step)
     return ca.vertcat(q0, q1, v1, h), ca.substitute(g, view.symbols["q"], q)
-
-
-def _columns(program: PhaseProgram, e: int) -> np.ndarray:
-    """Columns of that z of element `e`."""
-    c = program.columns
-    ends = c.end(e)["q"], c.end(e + 1)["q"], c.end(e + 1)["v"]
-    return np.concatenate([*ends, c.h[c.phase_of[e]]])
