@@ -366,7 +366,7 @@ def test_messages_of_several_shapes_are_one_topic() -> None:
         "b/1": [nan, nan, 5, nan, nan, nan], "b": [nan, nan, nan, 6, nan, nan],
         "position/hip": [nan] * 4 + [7, 10], "position/knee": [nan] * 4 + [8, 9],
     }  # fmt: skip
-    columns = topic.group().columns
+    columns = topic.group([]).columns
     assert columns.keys() == expected.keys() and "state" in topic.texts
     for name, values in expected.items():
         np.testing.assert_array_equal(columns[name], values)
@@ -378,8 +378,29 @@ def test_messages_of_one_stamp_count_once() -> None:
         topic, sent = Topic("/log"), ((3, 1.0), (5, 2.0), (5, 9.0), (8, 4.0))
         for i in order:
             topic.add(sent[i][0], {"x": sent[i][1]})
-        group = topic.group()
+        said: list[str] = []
+        group = topic.group(said)
         assert group.time.tolist() == [3, 5, 8] and group.columns["x"].tolist() == [1, 2, 4]
+        assert said == ["1 of 4 messages of /log have the stamp of another one and are left out"]
+
+
+@pytest.mark.parametrize("late", [40_000_000, 3_000_000_000])
+def test_messages_that_say_when_they_were_sent(late: int) -> None:
+    """A recorder writes them late and in bursts; a header of another clock tells nothing."""
+    topic, sent = Topic("/mocap"), START + 10**6 * np.arange(40)
+    written = sent[np.arange(40) // 10 * 10] + late
+    for at, stamp in zip(written.tolist(), sent.tolist(), strict=True):
+        header = {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}}
+        topic.add(at, {"header": header, "x": 1.0})
+    said: list[str] = []
+    group = topic.group(said)
+    if late < 10**9:
+        assert np.array_equal(group.time, sent)
+        assert said == [
+            "the times of /mocap are those of its headers, 35.5 ms before they were written"
+        ]
+    else:
+        assert np.array_equal(group.time, np.unique(written)) and "36 of 40 messages" in said[0]
 
 
 @pytest.mark.parametrize(
