@@ -71,13 +71,34 @@ def test_mdf(tmp_path: Path) -> None:
     assert "have a clock of their own" in back.meta["read"][0]
 
 
+def test_readings_that_mdf_calls_invalid_are_missing(tmp_path: Path) -> None:
+    """And a valve whose states have names is 0 or 1."""
+    asammdf = pytest.importorskip("asammdf")
+    log, bad = robot_log(), np.arange(400) // 50 == 2
+    named = {"val_0": 0, "text_0": b"off", "val_1": 1, "text_1": b"on", "default": b"?"}
+    signals = []
+    for name, values in columns_of(log).items():
+        wrong, valve = name == "body_z", "valve" in name
+        shown = np.where(bad, 9.99, values) if wrong else values.astype(np.uint8 if valve else "f8")
+        more = {"invalidation_bits": bad} if wrong else {"conversion": named} if valve else {}
+        signals.append(asammdf.Signal(shown, log.time, name=name, **more))
+    with asammdf.MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(tmp_path / "log.mf4")
+    back = read_back(tmp_path / "log.mf4", tmp_path)
+    same(back, log, 1e-9)
+    assert np.array_equal(np.isnan(back["body/z"]), bad)
+
+
 def _unit(name: str) -> str:
     return "deg" if name.endswith(("_q", "pitch")) else "Nm" if name.endswith("tau") else ""
 
 
-@pytest.mark.parametrize("waveform", [True, False])
-def test_tdms(waveform: bool, tmp_path: Path) -> None:
-    """Waveforms with increments and offsets of their own; else a channel of times."""
+@pytest.mark.parametrize("clock", ["", "Time", "Zeit [s]"])
+def test_tdms(clock: str, tmp_path: Path) -> None:
+    """Waveforms with increments and offsets of their own; else a channel of times, and what is not
+    as long is named."""
+    waveform = not clock
     nptdms = pytest.importorskip("nptdms")
     log = robot_log()
     channels = []
@@ -90,10 +111,13 @@ def test_tdms(waveform: bool, tmp_path: Path) -> None:
         given = given if waveform else {}
         channels.append(nptdms.ChannelObject("log", name, shown, properties=given))
     if not waveform:
-        channels.append(nptdms.ChannelObject("log", "Time", log.time))
+        channels.append(nptdms.ChannelObject("log", clock, log.time))
+        channels.append(nptdms.ChannelObject("log", "short", log.time[1:]))
     with nptdms.TdmsWriter(tmp_path / "log.tdms") as writer:
         writer.write_segment(channels)
-    same(read_back(tmp_path / "log.tdms", tmp_path), log, 2e-4)
+    back = read_back(tmp_path / "log.tdms", tmp_path)
+    same(back, log, 2e-4)
+    assert waveform or "not as long as" in back.meta["read"][0]
 
 
 def test_ulog(tmp_path: Path) -> None:
@@ -339,6 +363,16 @@ def test_vectors_of_two_rates(tmp_path: Path) -> None:
     same(back, log)
     assert np.isfinite(back["body/z"]).sum() == 40
     assert "left out, since no vector of their length is a time: lost" in back.meta["read"][0]
+
+
+def test_structs_in_a_struct_share_its_time(tmp_path: Path) -> None:
+    log = robot_log()
+    parts: dict[str, dict[str, np.ndarray]] = {}
+    for name in log.names:
+        part, _, rest = name.partition("/")
+        parts.setdefault(part, {})[rest.replace("/", "_")] = log[name]
+    savemat(tmp_path / "log.mat", {"robot": {"time": log.time, **parts}})
+    same(read_back(tmp_path / "log.mat", tmp_path), log)
 
 
 def test_what_holds_no_series_is_named_with_the_way_out(tmp_path: Path) -> None:

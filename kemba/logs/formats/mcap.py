@@ -92,8 +92,8 @@ class Topic:
             return Group(self.name, stamps, "ns", self.columns)
         if left := len(stamps) - len(order):
             said.append(
-                f"{left} of {len(stamps)} messages of {self.name} have the stamp of another one and "
-                "are left out"
+                f"{left} of {len(stamps)} messages of {self.name} have the stamp of another one "
+                "and are left out"
             )
         columns = {name: values[order] for name, values in self.columns.items()}
         return Group(self.name, stamps[order], "ns", columns)
