@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import needed, read_log
-from kemba.logs import ColumnMap, ColumnSource, load_map
+from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map, layout_of
 from kemba.logs.draft.matching import bench_targets, robot_targets
 from kemba.logs.draft.words import meaning, named_unit
@@ -108,6 +108,17 @@ def test_an_angle_of_a_knee_is_no_length_of_a_piston(name: str, tmp_path: Path) 
     else:
         asked = "front/piston/x [m]: is 'front_knee_pos' the piston's way, or the knee's angle?"
         assert asked in draft.questions
+
+
+def test_a_line_that_is_no_data_leaves_the_step_of_the_rows_known(tmp_path: Path) -> None:
+    """The map is drafted; the line is told when the log is read."""
+    path = foreign_files.abbreviated(foreign_files.robot_log(), tmp_path / "log.csv")
+    path.write_text(path.read_text() + "End of file\n")
+    draft = draft_map(path, LEGS, 0.07)
+    assert not draft.questions and not draft.missing
+    (tmp_path / "map.yaml").write_text(draft.text("log.csv"))
+    with pytest.raises(KembaError, match=r"log.csv:402:1: time: 'End of file' is not a number"):
+        open_log(path, load_map(tmp_path / "map.yaml"))
 
 
 def test_a_valve_that_never_switches_has_the_threshold_of_the_others(tmp_path: Path) -> None:

@@ -185,6 +185,13 @@ def test_an_answer_is_a_page_of_its_own(tmp_path: Path) -> None:
     assert f"kemba-opt solve jump.yaml --model {tmp_path}/model.yaml" in text
 
 
+@pytest.mark.parametrize("verdict", ["missing", "partly", "nothing"])
+def test_no_jump_is_planned_with_the_model_of_a_rig(verdict: str) -> None:
+    said = of_answer({**ANSWER, "verdict": verdict}, {**WORDS, "rig": "log.csv --model a.yaml"})
+    assert "jump" not in f"{said.next} {said.command}"
+    assert verdict == "nothing" or said.command == "kemba-opt compare log.csv --model a.yaml"
+
+
 @pytest.mark.parametrize("verdict", ["partly", "nothing", "unknown", "bad-data", "something new"])
 def test_every_verdict_gets_a_next_step(verdict: str, tmp_path: Path) -> None:
     answer = {**ANSWER, "verdict": verdict, "excess_before": 2.8, "excess_after": 0.5}
