@@ -115,8 +115,8 @@ def of_logs(
     answer: Facts | None,
     words: Mapping[str, str],
 ) -> ReviewVerdict:
-    """What the logs show; `words`: names of files for the commands (`logs`, `answer`, `task`; `rig`:
-    logs of a rig of the user's own, with the model of the answer)."""
+    """What the logs show; `words`: names of files for the commands: `logs`, `answer`, `task`, and
+    `rig`, the logs of a rig of the user's own with the model of the answer."""
     fallen = [(name, e.fault) for name, e in events if e and e.fault]
     if fallen:
         name, fault = fallen[0]
@@ -194,6 +194,9 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
         aim = "plan again with the corrected model:"
         task = words.get("task", "jump.yaml")
         command = f"kemba-opt solve {task} --model {folder}/model.yaml"
+        if added and all(name.startswith("sensor_") for name in added):
+            aim = "correct the sensors, or their columns with a map (--map); no plan changes."
+            return ReviewVerdict("fair", f"The model lacks {names}{rest}{falls}.", aim)
         if "rig" in words:
             aim = "see what the corrected model leaves of the error:"
             command = f"kemba-opt compare {words['rig']}"
@@ -206,6 +209,8 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
         logs = words.get("logs") or "LOG..."
         command = f"kemba-opt discover {logs} --time-limit {LONGER}"
         return ReviewVerdict("fair", own, "let the search go on for longer:", command)
+    if "rig" in words:
+        return ReviewVerdict("fair", own, "take logs of other motions, and run discover again.")
     aim = "design the test that tells more:"
     return ReviewVerdict("fair", own, aim, f"kemba-opt experiment {folder}")
 
