@@ -110,7 +110,8 @@ class Topic:
                 continue
             sent = parts[0].astype(np.int64) * NS + parts[1].astype(np.int64)
             late = float(np.median(written - sent)) / NS
-            fewer = len(np.unique(sent)) < len(np.unique(written))  # not set for each message
+            # else the header is not set anew for each message
+            fewer = np.count_nonzero(np.diff(sent)) < np.count_nonzero(np.diff(written))
             if abs(late) > SAME_CLOCK or fewer or np.array_equal(sent, written):
                 continue
             said.append(
