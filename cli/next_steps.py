@@ -115,10 +115,12 @@ def after_discover(logs: Sequence[Log], column_map: str | None, model: str, answ
     return f"review {_typed(logs, column_map, model)} --answer {shlex.quote(str(answer))}"
 
 
-def after_model(model: Path, rig: bool = False, logs: Sequence[Log] = ()) -> str:
+def after_model(
+    model: Path, rig: bool = False, logs: Sequence[Log] = (), column_map: Log | None = None
+) -> str:
     """A model of the robot is planned with; that of a rig is compared with its logs."""
     if rig:
-        return f"compare {_typed(logs, None, str(model))}" if logs else ""
+        return f"compare {_typed(logs, column_map, str(model))}" if logs else ""
     return f"solve jump.yaml --model {shlex.quote(str(model))}"
 
 

@@ -10,12 +10,19 @@ from typer.core import TyperCommand
 
 
 class Command(TyperCommand):
-    """A command whose complaint about a missing argument ends with the example of its help."""
+    """A command whose complaint about a missing argument ends with the example of its help, and
+    about a value says what was expected, where typer leaves it to pydantic."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as error:
+            from pydantic import ValidationError
+
+            if isinstance(error.__cause__, ValidationError):
+                from kemba.config import refused
+
+                error.message = refused(error.__cause__)
             found = re.search(r"^Example: .+$", self.help or "", re.MULTILINE)
             if found and not error.message:  # only that of a missing argument is empty
                 error.message = found[0]

@@ -142,7 +142,7 @@ def _own_rig(
     for name in found.apart:
         say(f"{name} differs between runs; its interval spans them", quiet)
     say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
-    say_next(after_model(out, True, logs) if out else "", quiet)
+    say_next(after_model(out, True, logs, column_map) if out else "", quiet)
 
 
 def _draw(

@@ -20,6 +20,10 @@ def export(
         str | None,
         typer.Option("--map", help="Column map YAML of the program that is to read the .csv."),
     ] = None,
+    source_map: Annotated[
+        str | None,
+        typer.Option("--from", help="Column map YAML of the program that wrote the log."),
+    ] = None,
     nlp: Annotated[
         bool, typer.Option("--nlp", help="Write the optimisation programs as CasADi functions.")
     ] = False,
@@ -39,7 +43,7 @@ def export(
 
         from kemba.report.programs import export_nlp
 
-        if column_map is not None:
+        if column_map is not None or source_map is not None:
             raise typer.BadParameter("a map goes with logs and plans", param_hint="--map")
         paths = export_nlp(run, out or Path("nlp"), force)
         names = [str(path) for path in paths]
@@ -53,7 +57,7 @@ def export(
     from kemba.plotting.source import load_source
     from kemba.report.export import export as write
 
-    source = load_source(run)
+    source = load_source(run, load_map(source_map) if source_map else None)
     fresh(out, force)
     path = write(source.trajectory, out, load_map(column_map) if column_map else None)
     print_json({"export": str(path)}) if json else typer.echo(path)

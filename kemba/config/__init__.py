@@ -16,6 +16,7 @@ from kemba.config.parsing import (
     find_config,
     is_file,
     parse,
+    refused,
     shipped_configs,
     shipped_folder,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "load_text",
     "load_yaml",
     "parse",
+    "refused",
     "shipped_configs",
     "shipped_folder",
     "written",

@@ -276,6 +276,19 @@ def complaints(
     return [*(report for _, report in kept), *rest]
 
 
+def refused(error: ValidationError) -> str:
+    """What is wrong with one value, such as that of an option; in pydantic's words of a kind that
+    no value of numbers has."""
+    item = error.errors(include_url=False)[0]
+    kind, bounds = item["type"], {k: _plain(v) for k, v in item.get("ctx", {}).items()}
+    wanted = BOUNDS[kind].format(**bounds) if kind in BOUNDS else EXPECTED.get(kind)
+    return f"{_shown(item['input'])}: {wanted} was expected" if wanted else item["msg"]
+
+
+def _plain(value: Any) -> Any:
+    return f"{value:g}" if isinstance(value, float) else value
+
+
 def _merged(entries: list[Complaint], document: Document) -> tuple[Location, KembaError]:
     """The one report on a place, from the errors of all branches of its union."""
     telling = [entry for entry in entries if entry.kind not in EXPECTED]

@@ -12,6 +12,7 @@ from kemba.files import read_json
 from kemba.identify.infer.windows import excess
 
 Verdict = Literal["missing", "partly", "nothing", "unknown", "bad-data"]
+HELD_OUT = "held-out logs"  # what an answer's errors are split by where logs were kept aside
 PROBABILITY = (
     "The probability of an effect is that of its being among the missing ones. Several effects can "
     "be missing at once, so that the probabilities need not add up to 100 %."
@@ -173,8 +174,13 @@ def phrase(answer: Answer) -> str:
     if float(after) >= float(before):
         falls = f"was {before} and is {after}"
     also = f" Likely as well: {enumerated([_named(r) for r in likely])}." if likely else ""
-    text = f"Missing: {named}; the held-out error {falls} times the noise."
+    text = f"Missing: {named}; the {_error(answer)} {falls} times the noise."
     return f"{text}{_doubt(parts)}{also}"
+
+
+def _error(answer: Answer) -> str:
+    """What the quoted error is called: held-out where the fit has not seen its logs."""
+    return "held-out error" if answer.split_by == HELD_OUT else "error"
 
 
 def _told(answer: Answer) -> tuple[list[Ranked], list[Ranked]]:
@@ -191,7 +197,7 @@ def _partly(answer: Answer) -> str:
     if likely:
         names = enumerated([_named(r) for r in likely])
         parts.append(f"Likely, but not sure: {names}.{_doubt(likely)}")
-    goes = f"held-out error goes from {answer.error_before:.2f} to {answer.error_after:.2f}"
+    goes = f"{_error(answer)} goes from {answer.error_before:.2f} to {answer.error_after:.2f}"
     share = 1.0 - answer.excess_after / max(answer.excess_before, 1e-9)
     together = "Together they explain" if len(answer.added) > 1 else "It explains"
     explained = f"{100 * max(share, 0.0):.0f} % of the error beyond the noise"

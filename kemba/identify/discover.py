@@ -6,7 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.answer import ENDED, Answer, DiscoverSettings, Ranked, VerdictSettings, phrase
+from kemba.identify.answer import (
+    ENDED,
+    HELD_OUT,
+    Answer,
+    DiscoverSettings,
+    Ranked,
+    VerdictSettings,
+    phrase,
+)
 from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
 from kemba.identify.infer.formula import Formula, look
 from kemba.identify.infer.identifiability import Identifiability, identifiability
@@ -248,7 +256,7 @@ def _answer(
         },
         alike=told.alike,
         formula=str(formula) if formula else None,
-        split_by="held-out logs" if kept else "runs" if by_run else "time blocks",
+        split_by=HELD_OUT if kept else "runs" if by_run else "time blocks",
         ladder=ladder(search, whole, kept),
     )
     answer.remarks = list(caveats.reasons)

@@ -1,6 +1,7 @@
 """Text tables of other programs: any separator, decimal sign and header."""
 
 import csv
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from kemba.trajectory import Array
 
 MISSING = ["", *"nan NaN NAN na NA null NULL none None -".split()]
 PIECE = 50_000  # rows that are read at a time: their texts take more memory than the numbers
+WIDE = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # pandas of a long row
 COMMENT = ("#", "%", "//")  # before a header, as of numpy.savetxt
 
 
@@ -46,8 +48,14 @@ def read_text(path: Path, layout: ColumnMap) -> Raw:
     except UnicodeDecodeError:
         raise KembaError(str(path), "is not a text", "a table was expected") from None
     except pd.errors.ParserError as error:
-        what = f"is no table with the separator '{layout.separator}': {error}".strip()
-        raise KembaError(str(path), what, hint="`separator` and `skip_rows` of the map") from None
+        hint = "`separator` and `skip_rows` of the map"
+        if wide := WIDE.search(str(error)):
+            width, line, count = wide.groups()
+            what = f"has {count} cells in a table of {width} columns"
+            raise KembaError(f"{path}:{line}", what, hint=hint) from None
+        why = str(error).removeprefix("Error tokenizing data. C error: ").strip()
+        what = f"is no table with the separator '{layout.separator}': {why}"
+        raise KembaError(str(path), what, hint=hint) from None
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     width = pieces[0].shape[1]

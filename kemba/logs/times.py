@@ -1,7 +1,7 @@
 """Times of recordings: stamps of any kind, rates, gaps."""
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -34,17 +34,33 @@ def seconds(cells: Column) -> Array | None:
     NaN for an empty cell. None where a text is no time.
 
     Dates need not be understood: a clock that falls by more than half its day has passed midnight.
+    What stands behind the seconds is a count, as of ms without zeros before them, where the clock
+    goes back else.
     """
     texts = [str(cell).strip() for cell in cells]
     known = [text for text in texts if text and text.lower() not in ("nan", "nat", "none")]
     if len(known) < 2 or any(_clock(text) is None for text in known[:3]):
         return None
+    found = _read(texts)
+    widths = {len(match["rest"] or "") for text in known if (match := _match(text))}
+    if found is None or _forward(found) or len(widths) < 2:
+        return found
+    counted = _read(texts, max(widths) - 1)  # less the mark
+    return counted if counted is not None and _forward(counted) else found
+
+
+def _forward(times: Array) -> bool:
+    return bool(np.all(np.diff(times[np.isfinite(times)]) >= 0.0))
+
+
+def _read(texts: Sequence[str], digits: int = 0) -> Array | None:
+    """Seconds (n,) since the first text; `digits` of the count behind the seconds, if it is one."""
     found, zones = np.full(len(texts), np.nan), set()
     wrap = 0.0
     for i, text in enumerate(texts):
         if not text or text.lower() in ("nan", "nat", "none"):
             continue
-        read = _clock(text)
+        read = _clock(text, digits)
         if read is None:
             return None
         found[i], wrap, zone = read
@@ -59,7 +75,13 @@ def seconds(cells: Column) -> Array | None:
     return np.asarray(found - found[good][0])
 
 
-def _clock(text: str) -> tuple[float, float, str] | None:
+def _match(text: str) -> re.Match[str] | None:
+    """The clock of day in a text, behind its date."""
+    date = DATE.match(text)
+    return CLOCK.fullmatch(text[date.end() :] if date else text)
+
+
+def _clock(text: str, digits: int = 0) -> tuple[float, float, str] | None:
     """Seconds, after how many the clock begins anew (0 for a duration), and the time zone."""
     compact = COMPACT.fullmatch(text)
     if ":" not in text and not compact:
@@ -69,14 +91,14 @@ def _clock(text: str) -> tuple[float, float, str] | None:
         hour, minute, second, rest = compact.groups()
         fraction = float("0" + (rest or ".0").replace(",", "."))
         return 3600 * int(hour) + 60 * int(minute) + int(second) + fraction, DAY, ""
-    date = DATE.match(text)
-    match = CLOCK.fullmatch(text[date.end() :] if date else text)
+    match = _match(text)
     if match is None:
         return None
     hour, days = int(match["hour"] or 0), match["days"]
     if match["half"]:
         hour = hour % 12 + (12 if match["half"].lower() == "pm" else 0)
-    fraction = float("0." + match["rest"][1:]) if match["rest"] else 0.0
+    rest = (match["rest"] or ".0")[1:]
+    fraction = int(rest) / 10**digits if digits else float(f"0.{rest}")
     value = 3600 * hour + 60 * int(match["minute"]) + int(match["second"]) + fraction
     if days is not None:
         return int(days) * DAY + value, 0.0, ""

@@ -14,7 +14,7 @@ from kemba.folders import place_for, typed
 from kemba.identify.answer import read_answer
 from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.identify.logs.gate import BadData
-from kemba.identify.logs.reading import read_logs
+from kemba.identify.logs.reading import OWN_RIGS, read_logs
 from kemba.logs import load_map
 from kemba.model import build_model, load_spec
 from kemba.plotting.source import Machine, load_machine
@@ -428,11 +428,14 @@ def _said(
     given: Material, tracks: Sequence[Track], events: Sequence[Events | None]
 ) -> ReviewVerdict:
     own = None if given.model == PLANNING else given.model
+    paths = [log.meta["path"] for log in given.logs]
     words = {
-        "logs": typed([log.meta["path"] for log in given.logs], given.column_map, own),
+        "logs": typed(paths, given.column_map, own),
         "answer": str(given.answer_folder),
         "task": str(given.run.task) if given.run else "jump.yaml",
     }
+    if any(log.meta.get("kind") in OWN_RIGS for log in given.logs):  # with which none jumps
+        words["rig"] = typed(paths, given.column_map, f"{given.answer_folder}/model.yaml")
     plan = next((e for t, e in zip(tracks, events, strict=True) if t.role == "plan"), None)
     if given.fault is not None:
         return of_bad_data(str(given.fault.errors[0]), words)

@@ -115,7 +115,8 @@ def of_logs(
     answer: Facts | None,
     words: Mapping[str, str],
 ) -> ReviewVerdict:
-    """What the logs show; `words`: names of files for the commands (`logs`, `answer`, `task`)."""
+    """What the logs show; `words`: names of files for the commands: `logs`, `answer`, `task`, and
+    `rig`, the logs of a rig of the user's own with the model of the answer."""
     fallen = [(name, e.fault) for name, e in events if e and e.fault]
     if fallen:
         name, fault = fallen[0]
@@ -139,7 +140,7 @@ def of_logs(
         return ReviewVerdict(
             "good",
             _joined([*parts, f"the model explains the logs to within the noise ({ratio})"]),
-            "nothing is to be added to the model; plan the next jump with it.",
+            f"nothing is to be added to the model{_jump(words)}.",
         )
     if found.tolerable:
         text = f"the model errs by {ratio}, no more than its nominal figures may be off"
@@ -193,19 +194,29 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
         aim = "plan again with the corrected model:"
         task = words.get("task", "jump.yaml")
         command = f"kemba-opt solve {task} --model {folder}/model.yaml"
+        if added and all(name.startswith("sensor_") for name in added):
+            aim = "correct the sensors, or their columns with a map (--map); no plan changes."
+            return ReviewVerdict("fair", f"The model lacks {names}{rest}{falls}.", aim)
+        if "rig" in words:
+            aim = "see what the corrected model leaves of the error:"
+            command = f"kemba-opt compare {words['rig']}"
         return ReviewVerdict("fair", f"The model lacks {names}{rest}{falls}.", aim, command)
     if verdict == "nothing":
-        return ReviewVerdict(
-            "good", own, "nothing is to be added to the model; plan the next jump."
-        )
+        return ReviewVerdict("good", own, f"nothing is to be added to the model{_jump(words)}.")
     if verdict == "bad-data":
         return ReviewVerdict("bad", f"FAILED: {own}", "correct the logs, and run discover again.")
     if verdict == "unknown" and ENDED in (answer.get("remarks") or ()):
         logs = words.get("logs") or "LOG..."
         command = f"kemba-opt discover {logs} --time-limit {LONGER}"
         return ReviewVerdict("fair", own, "let the search go on for longer:", command)
+    if "rig" in words:
+        return ReviewVerdict("fair", own, "take logs of other motions, and run discover again.")
     aim = "design the test that tells more:"
     return ReviewVerdict("fair", own, aim, f"kemba-opt experiment {folder}")
+
+
+def _jump(words: Mapping[str, str]) -> str:
+    return "" if "rig" in words else "; plan the next jump with it"
 
 
 def _flown(events: Sequence[Events], plan: Events | None) -> str:

@@ -46,7 +46,7 @@ def found(folder: Path) -> list[str]:
         next_steps.after_compare(LOGS, None, "planning", None, explained=False),
         next_steps.after_discover(LOGS, "map.yaml", "mine.yaml", answer),
         next_steps.after_model(folder / "my model.yaml"),
-        next_steps.after_model(folder / "my model.yaml", True, LOGS),
+        next_steps.after_model(folder / "my model.yaml", True, LOGS, "my map.yaml"),
         next_steps.after_experiment(folder / "next.yaml", True),
         next_steps.after_experiment(folder / "next.yaml", False),
         next_steps.after_sweep("my sweep.yaml", folder, False),
@@ -67,6 +67,8 @@ def test_the_planning_model_needs_no_option_and_another_does() -> None:
     asked = next_steps.discover(["a.csv"], "map.yaml", "planning")
     assert asked == "discover a.csv --map map.yaml"
     assert "--model mine.yaml" in next_steps.discover(["a.csv"], None, "mine.yaml")
+    after = next_steps.after_model(Path("mine.yaml"), True, ["a.csv"], "map.yaml")
+    assert after == "compare a.csv --map map.yaml --model mine.yaml"
 
 
 def test_nothing_is_said_where_nothing_follows(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import needed, read_log
-from kemba.logs import ColumnMap, ColumnSource, load_map
+from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map, layout_of
 from kemba.logs.draft.matching import bench_targets, robot_targets
 from kemba.logs.draft.words import meaning, named_unit
@@ -78,6 +78,47 @@ def test_a_bench_log_in_volts_and_bar(tmp_path: Path) -> None:
     assert draft.columns["valve/extend [1]"] == {"source": "valve_1", "threshold": 2.45}
     pressure = draft.columns["chamber/extend/P [Pa]"]
     assert pressure == {"source": "p_ext", "unit": "bar", "offset": "1.01325 bar"}
+
+
+def test_pressures_of_one_logger_count_from_one_zero(tmp_path: Path) -> None:
+    """A chamber falls to the atmosphere, the supply never does: it is a gauge pressure as well."""
+    log = foreign_files.robot_log()
+    table = {"time [s]": log.time, **{n.replace("/", "_"): v for n, v in log.columns.items()}}
+    table["front_chamber_extend_p [bar]"] = 3.0 + 3.0 * np.sin(9.0 * log.time)
+    table["front_chamber_extend_p [bar]"] -= table["front_chamber_extend_p [bar]"].min()
+    table["supply_p [bar]"] = np.full(len(log), 6.0)
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", LEGS, 0.07)
+    for header in ("front/chamber/extend/P [Pa]", "supply/P [Pa]"):
+        assert draft.columns[header]["offset"] == "1.01325 bar"
+    assert any("'supply_p [bar]': from the atmosphere" in note for note in draft.notes)
+
+
+@pytest.mark.parametrize("name", ["knee_angle", "knee_pos"])
+def test_an_angle_of_a_knee_is_no_length_of_a_piston(name: str, tmp_path: Path) -> None:
+    """Its size alone would be that of a piston in cm."""
+    log = foreign_files.robot_log()
+    table = {"time [s]": log.time, **{n.replace("/", "_"): v for n, v in log.columns.items()}}
+    for leg in LEGS:
+        table[f"{leg}_{name}"] = 0.8 + 6.0 * table.pop(f"{leg}_piston_x [m]")
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", LEGS, 0.07)
+    if name == "knee_angle":
+        assert draft.missing == ("front/piston/x [m]", "rear/piston/x [m]")
+    else:
+        asked = "front/piston/x [m]: is 'front_knee_pos' the piston's way, or the knee's angle?"
+        assert asked in draft.questions
+
+
+def test_a_line_that_is_no_data_leaves_the_step_of_the_rows_known(tmp_path: Path) -> None:
+    """The map is drafted; the line is told when the log is read."""
+    path = foreign_files.abbreviated(foreign_files.robot_log(), tmp_path / "log.csv")
+    path.write_text(path.read_text() + "End of file\n")
+    draft = draft_map(path, LEGS, 0.07)
+    assert not draft.questions and not draft.missing
+    (tmp_path / "map.yaml").write_text(draft.text("log.csv"))
+    with pytest.raises(KembaError, match=r"log.csv:402:1: time: 'End of file' is not a number"):
+        open_log(path, load_map(tmp_path / "map.yaml"))
 
 
 def test_a_valve_that_never_switches_has_the_threshold_of_the_others(tmp_path: Path) -> None:

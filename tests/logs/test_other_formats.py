@@ -71,13 +71,34 @@ def test_mdf(tmp_path: Path) -> None:
     assert "have a clock of their own" in back.meta["read"][0]
 
 
+def test_readings_that_mdf_calls_invalid_are_missing(tmp_path: Path) -> None:
+    """And a valve whose states have names is 0 or 1."""
+    asammdf = pytest.importorskip("asammdf")
+    log, bad = robot_log(), np.arange(400) // 50 == 2
+    named = {"val_0": 0, "text_0": b"off", "val_1": 1, "text_1": b"on", "default": b"?"}
+    signals = []
+    for name, values in columns_of(log).items():
+        wrong, valve = name == "body_z", "valve" in name
+        shown = np.where(bad, 9.99, values) if wrong else values.astype(np.uint8 if valve else "f8")
+        more = {"invalidation_bits": bad} if wrong else {"conversion": named} if valve else {}
+        signals.append(asammdf.Signal(shown, log.time, name=name, **more))
+    with asammdf.MDF(version="4.10") as file:
+        file.append(signals)
+        file.save(tmp_path / "log.mf4")
+    back = read_back(tmp_path / "log.mf4", tmp_path)
+    same(back, log, 1e-9)
+    assert np.array_equal(np.isnan(back["body/z"]), bad)
+
+
 def _unit(name: str) -> str:
     return "deg" if name.endswith(("_q", "pitch")) else "Nm" if name.endswith("tau") else ""
 
 
-@pytest.mark.parametrize("waveform", [True, False])
-def test_tdms(waveform: bool, tmp_path: Path) -> None:
-    """Waveforms with increments and offsets of their own; else a channel of times."""
+@pytest.mark.parametrize("clock", ["", "Time", "Zeit [s]"])
+def test_tdms(clock: str, tmp_path: Path) -> None:
+    """Waveforms with increments and offsets of their own; else a channel of times, and what is not
+    as long is named."""
+    waveform = not clock
     nptdms = pytest.importorskip("nptdms")
     log = robot_log()
     channels = []
@@ -90,10 +111,13 @@ def test_tdms(waveform: bool, tmp_path: Path) -> None:
         given = given if waveform else {}
         channels.append(nptdms.ChannelObject("log", name, shown, properties=given))
     if not waveform:
-        channels.append(nptdms.ChannelObject("log", "Time", log.time))
+        channels.append(nptdms.ChannelObject("log", clock, log.time))
+        channels.append(nptdms.ChannelObject("log", "short", log.time[1:]))
     with nptdms.TdmsWriter(tmp_path / "log.tdms") as writer:
         writer.write_segment(channels)
-    same(read_back(tmp_path / "log.tdms", tmp_path), log, 2e-4)
+    back = read_back(tmp_path / "log.tdms", tmp_path)
+    same(back, log, 2e-4)
+    assert waveform or "not as long as" in back.meta["read"][0]
 
 
 def test_ulog(tmp_path: Path) -> None:
@@ -341,6 +365,16 @@ def test_vectors_of_two_rates(tmp_path: Path) -> None:
     assert "left out, since no vector of their length is a time: lost" in back.meta["read"][0]
 
 
+def test_structs_in_a_struct_share_its_time(tmp_path: Path) -> None:
+    log = robot_log()
+    parts: dict[str, dict[str, np.ndarray]] = {}
+    for name in log.names:
+        part, _, rest = name.partition("/")
+        parts.setdefault(part, {})[rest.replace("/", "_")] = log[name]
+    savemat(tmp_path / "log.mat", {"robot": {"time": log.time, **parts}})
+    same(read_back(tmp_path / "log.mat", tmp_path), log)
+
+
 def test_what_holds_no_series_is_named_with_the_way_out(tmp_path: Path) -> None:
     savemat(tmp_path / "log.mat", {"gain": 3.0, "name": "EMPS"})
     with pytest.raises(KembaError, match="holds no vector of numbers: 'gain'"):
@@ -366,7 +400,7 @@ def test_messages_of_several_shapes_are_one_topic() -> None:
         "b/1": [nan, nan, 5, nan, nan, nan], "b": [nan, nan, nan, 6, nan, nan],
         "position/hip": [nan] * 4 + [7, 10], "position/knee": [nan] * 4 + [8, 9],
     }  # fmt: skip
-    columns = topic.group().columns
+    columns = topic.group([]).columns
     assert columns.keys() == expected.keys() and "state" in topic.texts
     for name, values in expected.items():
         np.testing.assert_array_equal(columns[name], values)
@@ -378,8 +412,29 @@ def test_messages_of_one_stamp_count_once() -> None:
         topic, sent = Topic("/log"), ((3, 1.0), (5, 2.0), (5, 9.0), (8, 4.0))
         for i in order:
             topic.add(sent[i][0], {"x": sent[i][1]})
-        group = topic.group()
+        said: list[str] = []
+        group = topic.group(said)
         assert group.time.tolist() == [3, 5, 8] and group.columns["x"].tolist() == [1, 2, 4]
+        assert said == ["1 of 4 messages of /log have the stamp of another one and are left out"]
+
+
+@pytest.mark.parametrize("late", [40_000_000, 3_000_000_000])
+def test_messages_that_say_when_they_were_sent(late: int) -> None:
+    """A recorder writes them late and in bursts; a header of another clock tells nothing."""
+    topic, sent = Topic("/mocap"), START + 10**6 * np.arange(40)
+    written = sent[np.arange(40) // 10 * 10] + late
+    for at, stamp in zip(written.tolist(), sent.tolist(), strict=True):
+        header = {"stamp": {"sec": stamp // 10**9, "nanosec": stamp % 10**9}}
+        topic.add(at, {"header": header, "x": 1.0})
+    said: list[str] = []
+    group = topic.group(said)
+    if late < 10**9:
+        assert np.array_equal(group.time, sent)
+        assert said == [
+            "the times of /mocap are those of its headers, 35.5 ms before they were written"
+        ]
+    else:
+        assert np.array_equal(group.time, np.unique(written)) and "36 of 40 messages" in said[0]
 
 
 @pytest.mark.parametrize(

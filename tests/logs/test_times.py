@@ -12,6 +12,17 @@ def test_a_clock_that_goes_back_a_little_does_not_begin_anew() -> None:
     assert read == pytest.approx([0.0, -0.1, 1.0])
 
 
+@pytest.mark.parametrize("mark", [".", ",", ":"])
+def test_milliseconds_without_zeros_before_them_are_a_count(mark: str) -> None:
+    """12:00:01.5 is 5 ms after the second where 12:00:01.12 follows a row later."""
+    ms = np.arange(995, 2120, 7)
+    texts = [f"12:00:{count // 1000:02d}{mark}{count % 1000}" for count in ms]
+    read = seconds(np.array(texts, dtype=object))
+    assert read == pytest.approx((ms - ms[0]) / 1000)
+    short = seconds(np.array(["12:00:01.25", "12:00:01.5", "12:00:01.75"], dtype=object))
+    assert short == pytest.approx([0.0, 0.25, 0.5])
+
+
 @pytest.mark.parametrize(("gap", "known"), [(24e-3, True), (26e-3, False)])
 def test_nothing_is_known_far_from_the_next_reading(gap: float, known: bool) -> None:
     """Of a channel in steps of 10 ms; the row is just after the reading before the gap."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.logs.draft.words import Names, named_unit, quaternions
+from kemba.logs.draft.words import Names, named_unit, quaternions, strange_unit
 
 
 @pytest.mark.parametrize(("norm", "turned"), [(1.0, 1), (1.019, 1), (1.021, 0), (0.979, 0)])
@@ -16,6 +16,39 @@ def test_four_columns_of_about_unit_norm_are_a_quaternion(norm: float, turned: i
     assert len(found) == turned
     for pitch in found:
         assert left[pitch] == pytest.approx(2 * half)
+
+
+@pytest.mark.parametrize(
+    ("form", "found"), [("xyzw", 1), ("XYZW", 1), ("wxyz", 1), ("0123", 0), ("1230", 1)]
+)
+def test_the_order_of_a_quaternion_is_told_by_its_names(form: str, found: int) -> None:
+    """In the order x, y, z, w. Of numbers, w is the first, unless the values say otherwise."""
+    half = np.linspace(0.0, 0.4, 50)
+    parts = 0 * half, np.sin(half), 0 * half, np.cos(half)
+    order = dict(zip("xyzw", parts, strict=True))
+    values = {
+        f"base.q{axis}": order.get(axis.lower(), part)
+        for axis, part in zip(form, parts, strict=True)
+    }
+    left, _, turned = quaternions(values, Names(("front", "rear")))
+    assert len(turned) == found
+    for pitch in turned:
+        assert left[pitch] == pytest.approx(2 * half)
+
+
+@pytest.mark.parametrize("unit", ["°/100", "0.01°", "deg/100", "%/10"])
+def test_a_factor_before_or_behind_a_sign_is_part_of_the_unit(unit: str) -> None:
+    assert named_unit(f"pitch [{unit}]") == ("pitch", unit)
+
+
+@pytest.mark.parametrize("text", ["'", '"', "1/100", "10^-3", "counts"])
+def test_what_looks_like_a_unit_and_is_none_is_told(text: str) -> None:
+    assert named_unit(f"hip [{text}]")[1] is None and strange_unit(f"hip [{text}]", ()) == text
+
+
+@pytest.mark.parametrize("text", ["", "-", "0", "#1", "body", "1:3"])
+def test_a_place_or_a_remark_in_brackets_is_no_unit(text: str) -> None:
+    assert named_unit(f"hip [{text}]")[1] is None and strange_unit(f"hip [{text}]", ()) is None
 
 
 def test_a_unit_inside_a_name_is_taken_where_there_is_one() -> None:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from kemba.config import shipped_configs
 from kemba.identify.logs.reading import read_log
-from kemba.logs import load_map
+from kemba.logs import load_map, open_log
 from kemba.plotting.source import load_source
 from kemba.report.view import scene, script_text, stage
 from kemba.trajectory import Trajectory
@@ -140,6 +140,10 @@ def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
     figure = tmp_path / "foreign.png"
     drawn = ("plot", str(out), "--map", str(tmp_path / "other.yaml"), "--save", str(figure))
     assert call(*drawn).exit_code == 0 and figure.is_file()
+    back = tmp_path / "back.npz"
+    given = ("export", str(out), "--from", str(tmp_path / "other.yaml"), "--out", str(back))
+    assert call(*given).exit_code == 0
+    np.testing.assert_allclose(open_log(back)["rear/hip/q"], plan["rear/hip/q"], atol=1e-12)
     page = tmp_path / "foreign.html"
     seen = call("view", str(out), "--map", str(tmp_path / "other.yaml"), "--out", str(page))
     assert seen.exit_code == 0 and "<canvas" in page.read_text(), seen.output

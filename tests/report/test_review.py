@@ -185,6 +185,20 @@ def test_an_answer_is_a_page_of_its_own(tmp_path: Path) -> None:
     assert f"kemba-opt solve jump.yaml --model {tmp_path}/model.yaml" in text
 
 
+def test_a_fault_of_a_sensor_is_not_planned_with() -> None:
+    said = of_answer({**ANSWER, "added": ["sensor_bias:body/z"]}, WORDS)
+    assert said.next.startswith("correct the sensors") and not said.command
+
+
+@pytest.mark.parametrize("verdict", ["missing", "partly", "nothing", "unknown"])
+def test_what_is_for_the_robot_is_not_advised_for_a_rig(verdict: str) -> None:
+    """No jump is planned with its model, and no test of the robot's is designed."""
+    said = of_answer({**ANSWER, "verdict": verdict}, {**WORDS, "rig": "log.csv --model a.yaml"})
+    found = verdict in ("missing", "partly")
+    assert said.command == ("kemba-opt compare log.csv --model a.yaml" if found else "")
+    assert "jump" not in said.next
+
+
 @pytest.mark.parametrize("verdict", ["partly", "nothing", "unknown", "bad-data", "something new"])
 def test_every_verdict_gets_a_next_step(verdict: str, tmp_path: Path) -> None:
     answer = {**ANSWER, "verdict": verdict, "excess_before": 2.8, "excess_after": 0.5}

@@ -52,14 +52,22 @@ class GateSettings:
 
 # Physical limits by the last part of the name: smallest, largest, and the likely mistake.
 RANGES = {
-    "piston/x": (-0.01, 1.0, "metres from 0 (retracted) to the stroke; is it in millimetres?"),
+    "piston/x": (
+        -0.01,
+        1.0,
+        "metres from 0 (retracted) to the stroke; is it in millimetres, or counted backwards?",
+    ),
     "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
     "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
     "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
     "hip/tau": (-60.0, 60.0, "newton metres at the joint; is it in N.mm?"),
     "body/pitch": (-math.pi, math.pi, "radians, nose up positive; is it in degrees?"),
     "body/x": (-20.0, 20.0, "metres; is it in millimetres?"),
-    "body/z": (-0.1, 3.0, "metres above the ground; is it in millimetres?"),
+    "body/z": (
+        -0.1,
+        3.0,
+        "metres above the ground; is it in millimetres, or counted downwards?",
+    ),
     "body/vx": (-20.0, 20.0, "metres per second"),
     "body/vz": (-20.0, 20.0, "metres per second"),
     "body/ax": (-2000.0, 2000.0, "metres per second squared"),

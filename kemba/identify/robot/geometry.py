@@ -8,7 +8,7 @@ foot sinks into it as it is loaded, and its load goes with the body's accelerati
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 
@@ -18,9 +18,9 @@ from scipy.optimize import least_squares
 
 from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
-from kemba.identify.robot.batch import Batch
+from kemba.identify.robot.batch import Batch, ResampledLog
 from kemba.identify.robot.contact import steady
-from kemba.identify.robot.mix_ups import MixUp, slight
+from kemba.identify.robot.mix_ups import SAME, MixUp, corrected, slight
 from kemba.identify.robot.physics import Physics, SampleMap
 from kemba.identify.robot.reference import Reference
 from kemba.mechanism.knee import flexion_of
@@ -53,8 +53,7 @@ HELD = 1e-6  # width of what is not free, as a share: as good as none
 DEEP = 0.02  # depth below the ground at which no foot can be [m]
 OFTEN = 0.01  # share of samples so deep from which lengths are not believed
 GAIN = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
-# gain of a mistake in the columns over any lengths from which it is named, and within which two
-# cannot be told [nats]
+# gain of a mistake in the columns over any lengths from which there may be one [nats]
 MISTAKEN = 12.0
 # prior sigma of the zero of the pitch where mistakes are judged: no zero is taken for one [rad]
 PITCH = 0.05
@@ -138,10 +137,14 @@ class Standing:
 
 
 def standing_lengths(
-    physics: Physics, batch: Batch, reference: Reference, candidates: Mapping[str, Candidate]
+    physics: Physics,
+    batch: Batch,
+    reference: Reference,
+    candidates: Mapping[str, Candidate],
+    left: Callable[[ResampledLog], float],
 ) -> StandingLengths:
     """The lengths at which feet stand on the ground; none where those of the model are as good, or
-    where no lengths are candidates."""
+    where no lengths are candidates. `left`: what the model leaves of a log."""
     sizes = {c.key: c.lead.size for c in candidates.values() if c.effect.startswith(GEOMETRY)}
     if not sizes:
         return StandingLengths()
@@ -161,7 +164,7 @@ def standing_lengths(
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
-    if mistakes := tuple(_mistakes(standing, x, width, rows)):
+    if _mistaken(standing, x, width, rows) and (mistakes := told_by_motion(physics, batch, left)):
         return StandingLengths(mistakes=mistakes)
     if x[-2] > SOFT or min(_drawn(standing, x, width, rows)) - cost < GAIN:
         return StandingLengths()
@@ -191,13 +194,13 @@ def remarks(found: StandingLengths) -> list[str]:
     return [f"{said}, {other}; contacts were read with the former"]
 
 
-def _mistakes(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[str]:
-    """Slight mistakes in the columns without which feet stand better than with any lengths.
+def _mistaken(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
+    """Whether feet stand better without a slight mistake in the columns than with any lengths.
 
     Each is judged by the samples (n, legs) that stand with or without it: `rows` with it, fitted by
     `x`.
     """
-    loose, gains = width.copy(), {}
+    loose, gains = width.copy(), list[float]()
     loose[len(standing.names)] = PITCH
     drawn = loose.copy()
     drawn[: len(standing.names)] *= HELD
@@ -206,9 +209,23 @@ def _mistakes(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterat
         either = rows | _refined(other, np.zeros(len(x)), drawn)[2]
         _, best, _ = _refined(standing, x, loose, either)
         _, cost, _ = _refined(other, np.zeros(len(x)), drawn, either)
-        gains[mistake.text] = best - cost
-    most = max(gains.values())
-    yield from (text for text, gain in gains.items() if gain > max(MISTAKEN, most - MISTAKEN))
+        gains.append(best - cost)
+    return max(gains) > MISTAKEN
+
+
+def told_by_motion(
+    physics: Physics, batch: Batch, left: Callable[[ResampledLog], float]
+) -> tuple[str, ...]:
+    """The slight mistakes without which the model leaves least of the logs, and less than as they
+    are: which one it is, and whether it is none but a late sensor, heights of feet cannot tell."""
+    after = {
+        mistake.text: sum(left(corrected(log, physics, [mistake])) for log in batch.resampled)
+        for mistake in slight(physics.legs)
+    }
+    least = min(after.values())
+    if SAME * least > sum(map(left, batch.resampled)):
+        return ()
+    return tuple(text for text, error in after.items() if error <= SAME * least)
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:

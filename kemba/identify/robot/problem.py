@@ -102,11 +102,10 @@ class RobotProblem(Problem):
         self.candidates: dict[str, Candidate] = {**found, **sensor_candidates(sigma, model)}
         sensors = SensorFaults(model.effects)
         reference = first_reference(physics, batch, physics.nominal)
-        self.standing = standing_lengths(physics, batch, reference, self.candidates)
+        left = self._left(physics)
+        self.standing = standing_lengths(physics, batch, reference, self.candidates, left)
         legs = self.standing.lengths
-        self.mixed = [
-            f for log in batch.resampled for f in mixed_up(physics, log, legs, self._left(physics))
-        ]
+        self.mixed = [f for log in batch.resampled for f in mixed_up(physics, log, legs, left)]
         if not self.mixed and self.standing.mistakes:
             self.mixed = [slightly_mixed_up(self.runs, self.standing.mistakes)]
         if self.mixed:  # lengths are not fitted to a log whose zeros are in doubt

@@ -97,8 +97,8 @@ def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | Non
     if against and best.score > UNNAMED:
         other = against[0]
         question = (
-            f"is the time {'+'.join(best.names)}, {best.seconds[-1]:.4g} s long, or "
-            f"{'+'.join(other.names)}, {other.seconds[-1]:.4g} s long?"
+            f"is the time {'+'.join(best.names)}, {np.nanmax(best.seconds):.4g} s long, or "
+            f"{'+'.join(other.names)}, {np.nanmax(other.seconds):.4g} s long?"
         )
     return replace(best, reason=reason, question=question)
 
@@ -153,13 +153,14 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
     score, reason = called
     unit = stated or matching.time_unit(rows[np.isfinite(rows)])
     exact = raw[name] if raw[name].dtype.kind in "iu" else rows
-    seconds = convert(np.asarray(exact - exact[0], dtype=float), unit, "s")
+    begin = exact[np.argmax(np.isfinite(rows))]
+    seconds = convert(np.asarray(exact - begin, dtype=float), unit, "s")
     from_first = abs(convert(float(rows[np.isfinite(rows)][0]), unit, "s")) > STAMPED
     source = {"source": name, **({} if unit == "s" else {"unit": unit})}
     question = ""
     if stated is None:
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
-        step = float(np.median(np.diff(seconds)))
+        step = float(np.median(np.diff(seconds[np.isfinite(seconds)])))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
         if not (first <= step <= last or _since_1970(rows, unit)):
             question = (

@@ -25,7 +25,16 @@ from kemba.logs.draft.matching import (
     robot_targets,
 )
 from kemba.logs.draft.sizes import guessed_units
-from kemba.logs.draft.words import SPELT, Names, is_unit, quaternions, strange_unit, upright
+from kemba.logs.draft.words import (
+    SPELT,
+    WORDS,
+    Names,
+    is_unit,
+    quaternions,
+    strange_unit,
+    upright,
+    words,
+)
 from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
 from kemba.logs.text import cells_of, encoding, joined
 from kemba.trajectory import TIME, Array
@@ -38,6 +47,7 @@ NUMBER = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"),
 }
+PISTONS = frozenset(WORDS["part"]["piston"].split()) - {"knee"}
 Layout = dict[str, Any]
 
 
@@ -191,6 +201,7 @@ def draft_map(
     kind, targets = _kind(names, rest, rig, logged or {})
     found = assigned(names, rest, targets)
     columns, asked = _sources(found, targets, names, rest, stroke, turned)
+    said += _share_gauge(columns, found.pairs)
     number = {name: i for i, name in enumerate(raw.columns, start=1)}
     columns = {TIME: _by_number(stamp.source, number), **columns}
     columns = {header: _by_number(source, number) for header, source in columns.items()}
@@ -282,6 +293,10 @@ def _asked(target: Target, name: str, names: Names) -> list[str]:
     strange = strange_unit(written, names.legs)
     if strange and names.unit(name) is None and not target.is_valve:
         found.append(f"{target.header}: '{name}' is in '{strange}', which is no unit that is known")
+    if target.header.endswith("piston/x [m]") and names.unit(name) is None:
+        said = set(words(names.bare(name)))
+        if "knee" in said and not said & PISTONS:
+            found.append(f"{target.header}: is '{name}' the piston's way, or the knee's angle?")
     if "desired" in names.says(name).get("role", ()) and not target.is_command:
         found.append(f"{target.header}: '{name}' is what was asked for; which column is measured?")
     return found
@@ -299,6 +314,20 @@ def _share_level(
             and np.nanmax(values[name]) == np.nanmin(values[name])
         ):
             columns[header]["threshold"] = level
+
+
+def _share_gauge(columns: dict[str, dict[str, Any]], pairs: Mapping[str, str]) -> list[str]:
+    """All pressures count from the atmosphere where one of them falls to zero; what is said of the
+    others."""
+    pressures = [header for header in columns if header.endswith("[Pa]")]
+    gauge = [header for header in pressures if "offset" in columns[header]]
+    rest = [header for header in pressures if header not in gauge]
+    if not gauge or not rest:
+        return []
+    for header in rest:
+        columns[header]["offset"] = matching.ATMOSPHERE
+    listed = ", ".join(f"'{pairs[header]}'" for header in rest)
+    return [f"Pressures: {listed}: from the atmosphere, as '{pairs[gauge[0]]}', which falls to it"]
 
 
 def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.logs.draft.words import Meaning, Names, unknown, without_sensors, words
+from kemba.logs.draft.words import ANGLES, Meaning, Names, unknown, without_sensors, words
 from kemba.quantity import convert
 from kemba.trajectory import Array
 
@@ -195,6 +195,8 @@ def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target
         whole, short = names.says(name), names.says(name, sensors=False)
         for i, target in enumerate(targets):
             if name in names.switches and not target.is_valve:
+                continue
+            if target.unit == "m" and unit is None and ANGLES & {*words(bare)}:
                 continue
             if fits(target, unit, values[name]):
                 score = agreement(by_unit(whole, target, unit), target)

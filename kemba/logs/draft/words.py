@@ -72,6 +72,7 @@ LEG_WORDS = {
     "left": "left l links",
     "right": "right r rechts",
 }
+ANGLES = frozenset("angle ang theta winkel".split())
 ORDER = ("acceleration", "speed")  # a rate of a position is no position
 SPELT = {
     "degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg", "radians": "rad",
@@ -82,6 +83,8 @@ UNITS = (
     "ns us µs ms s min mm cm m in deg rad mrad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V"
 ).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
+# of minutes, inches, per mille, and factors alone: `[1/100]`
+UNIT_MARK = re.compile(r"['\"′″‰]+|[\d\s.]*[/^]\s*-?\d+")
 LEGS_IN_BRACKETS = frozenset("L R F B H A".split())  # `(L)` is the left one, not litres
 BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
 WORD = re.compile(r"[A-Z]?[a-zµ°äöüß]+|[A-Z]+(?![a-z])|\d+")
@@ -154,9 +157,8 @@ def named_unit(name: str) -> tuple[str, str | None]:
 
 def is_unit(text: str, indexed: bool = False) -> bool:
     """Whether a text is a unit; `indexed`: a bare number is the place in an array."""
-    if not text or (
-        re.fullmatch(r"[\d\W]+", text) and (indexed or text != "1") and text not in "°%"
-    ):
+    lettered = any(sign.isalpha() or sign in "°%" for sign in text)
+    if not lettered and (indexed or text != "1"):
         return False
     try:
         parse_unit(text)
@@ -169,9 +171,10 @@ def strange_unit(name: str, legs: Sequence[str]) -> str | None:
     """What stands in brackets like a unit and is none that is known: `[counts]`."""
     for match in BRACKETS.finditer(name):
         text = (match[1] or match[2] or "").strip()
-        if not any(letter.isalpha() for letter in text) or named_unit(name)[1] is not None:
+        marked = bool(UNIT_MARK.fullmatch(text))
+        if not (marked or any(map(str.isalpha, text))) or named_unit(name)[1] is not None:
             continue
-        if unknown(text, legs):
+        if marked or unknown(text, legs):
             return text
     return None
 
@@ -243,8 +246,8 @@ def _groups(legs: Sequence[str]) -> dict[str, dict[str, str]]:
     return {**WORDS, "leg": {leg: LEG_WORDS.get(leg, leg.lower()) for leg in legs}}
 
 
-QUATERNION = re.compile(r"(?P<stem>.*?)(?P<mark>q(?:uat)?_?)?(?P<axis>[xyzw])")
-NUMBERED = re.compile(r"(?P<stem>.*?q)[\[_/]?(?P<axis>[0-3])\]?")  # of PX4: w first
+QUATERNION = re.compile(r"(?P<stem>.*?)(?P<mark>[qQ](?:uat)?_?)?(?P<axis>[xyzwXYZW])")
+NUMBERED = re.compile(r"(?P<stem>.*?q)[\[_/]?(?P<axis>[0-3])\]?")  # w first, as in PX4
 UNIT_NORM = 0.02
 
 
@@ -252,15 +255,19 @@ def quaternions(
     values: Mapping[str, Array], names: Names
 ) -> tuple[dict[str, Array], Names, dict[str, tuple[str, ...]]]:
     """The columns without those of quaternions, each with the pitch that it turns by instead, and
-    the four columns x, y, z, w of each pitch."""
+    the four columns x, y, z, w of each pitch. Four that are numbered are one only where the first
+    is the larger of the outer two: else w may be the last."""
     found: dict[str, dict[str, str]] = {}
+    numbered = set()
     for name in values:
         bare = named_unit(name)[0]
         match = QUATERNION.fullmatch(bare)
         number = NUMBERED.fullmatch(bare)
         if match:
-            found.setdefault(f"{match['stem']}{match['mark'] or ''}", {})[match["axis"]] = name
+            stem = f"{match['stem']}{match['mark'] or ''}"
+            found.setdefault(stem, {})[match["axis"].lower()] = name
         elif number:
+            numbered.add(number["stem"])
             found.setdefault(number["stem"], {})["wxyz"[int(number["axis"])]] = name
     left, labels, turned = dict(values), dict(names.labels), {}
     for stem, parts in found.items():
@@ -269,6 +276,9 @@ def quaternions(
         four = tuple(parts[axis] for axis in "xyzw")
         norm = np.sqrt(sum(values[name] ** 2 for name in four))
         if np.mean(np.abs(norm[np.isfinite(norm)] - 1.0) < UNIT_NORM) < 0.99:
+            continue
+        last, first = (np.nanmedian(np.abs(values[name])) for name in four[2:])
+        if stem in numbered and first < last:
             continue
         for name in four:
             left.pop(name)

@@ -105,15 +105,19 @@ class Found:
                 self.series.append((label, time, values))
 
     def group(self, path: str, time: np.ndarray, fields: dict[str, Any], depth: int) -> None:
-        """A struct of a time (n,) and arrays as long; other fields are walked through."""
+        """A struct of a time (n,) and arrays as long, in structs of its own too, unless they have
+        a time; other fields are walked through."""
         for key, value in fields.items():
-            values = numbers(value)
+            values, inner = numbers(value), self.fields(value)
             if key.strip("_").lower() == "time":
                 continue
+            label = f"{path}/{key}".strip("/")
             if values is not None and len(time) in values.shape:
-                self.series.append((f"{path}/{key}".strip("/"), time, values))
+                self.series.append((label, time, values))
+            elif inner is not None and depth < DEEPEST and not _has_time(inner):
+                self.group(label, time, inner, depth + 1)
             else:
-                self.walk(f"{path}/{key}".strip("/"), value, depth + 1)
+                self.walk(label, value, depth + 1)
 
     def cells(self, path: str, value: np.ndarray, depth: int) -> None:
         """A cell array (n,): of texts, or of anything, each under its name or its number."""
@@ -141,6 +145,10 @@ class Found:
 
 
 LABELS = ("name", "blockpath", "classname", "propagatedname", "porttype", "portindex", "version")
+
+
+def _has_time(fields: dict[str, Any]) -> bool:
+    return bool({key.strip("_").lower() for key in fields} & {"time", "timeinfo"})
 
 
 def numbers(value: Any) -> np.ndarray | None:

@@ -26,6 +26,16 @@ from kemba.trajectory import TIME, Trajectory
 Decode = Callable[[bytes], Any]
 NUMBERS = (bool, int, float, np.number)
 KNOWN: dict[type, tuple[str, ...]] = {}  # fields of the classes of messages that were met
+NS = 1_000_000_000
+# where messages say when they were sent: whole seconds, and ns
+HEADERS = (
+    ("header/stamp/sec", "header/stamp/nanosec"),
+    ("header/stamp/secs", "header/stamp/nsecs"),
+    ("header/stamp/sec", "header/stamp/nsec"),
+    ("timestamp/seconds", "timestamp/nanos"),
+    ("timestamp/sec", "timestamp/nsec"),
+)
+SAME_CLOCK = 0.5  # s; a message that took longer was stamped by another clock
 
 
 class Topic:
@@ -72,15 +82,44 @@ class Topic:
         self._shapes = {key: replace(s, numbers=array("d")) for key, s in self._shapes.items()}
         return found
 
-    def group(self) -> Group:
-        """The topic in the order of its stamps, equal ones once."""
-        stamps = np.array(self.stamps, dtype=np.int64)
+    def group(self, said: list[str]) -> Group:
+        """The topic in the order of its stamps, equal ones once; what a reader has to know of them
+        is `said`."""
+        stamps = self._stamps(said)
         order = np.argsort(stamps, kind="stable")
         order = order[np.concatenate([[True], np.diff(stamps[order]) > 0])]
         if len(order) == len(stamps) and np.all(np.diff(order) > 0):
             return Group(self.name, stamps, "ns", self.columns)
+        if left := len(stamps) - len(order):
+            said.append(
+                f"{left} of {len(stamps)} messages of {self.name} have the stamp of another one "
+                "and are left out"
+            )
         columns = {name: values[order] for name, values in self.columns.items()}
         return Group(self.name, stamps[order], "ns", columns)
+
+    def _stamps(self, said: list[str]) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """When the messages (n,) were sent [ns], by their headers; when they were written, where
+        they have none or these are of another clock."""
+        written = np.array(self.stamps, dtype=np.int64)
+        for whole, rest in HEADERS:
+            if not {whole, rest} <= set(self.columns):
+                continue
+            parts = self.columns[whole], self.columns[rest]
+            if not all(np.isfinite(part).all() for part in parts):
+                continue
+            sent = parts[0].astype(np.int64) * NS + parts[1].astype(np.int64)
+            late = float(np.median(written - sent)) / NS
+            # else the header is not set anew for each message
+            fewer = np.count_nonzero(np.diff(sent)) < np.count_nonzero(np.diff(written))
+            if abs(late) > SAME_CLOCK or fewer or np.array_equal(sent, written):
+                continue
+            said.append(
+                f"the times of {self.name} are those of its headers, "
+                f"{1e3 * abs(late):.3g} ms {'after' if late < 0 else 'before'} they were written"
+            )
+            return sent
+        return written
 
 
 @dataclass
@@ -222,7 +261,6 @@ def _length(value: Any) -> int:
 
 
 META = "kemba"
-NS = 1_000_000_000
 
 
 def write_mcap(trajectory: Trajectory, path: Path) -> None:
@@ -286,7 +324,7 @@ def read_mcap(path: Path) -> Recording:
         raise _nothing(path, skipped, said)
     said += [f"topic {name} is not read: {why}" for name, why in skipped.items()]
     if META not in known:
-        groups = [topic.group() for topic in topics.values() if topic.columns]
+        groups = [topic.group(said) for topic in topics.values() if topic.columns]
         return recording(groups, said)
     try:
         return replace(_own(topics, known[META]), remarks=tuple(said))

@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.formats import check_size
-from kemba.logs.recording import Column, Group, Raw, Recording, recording, shared
+from kemba.logs.recording import TIME_WORD, Column, Group, Raw, Recording, recording, shared
 
 
 def read_mf4(path: Path) -> Recording:
@@ -27,7 +27,8 @@ def _mdf_group(file: Any, number: int) -> Group | None:
     signals = [
         signal
         for signal in file.select(
-            [(None, number, i) for i in range(len(file.groups[number].channels))]
+            [(None, number, i) for i in range(len(file.groups[number].channels))],
+            ignore_value2text_conversions=True,  # a valve is 0 or 1, not a text
         )
         if signal.samples.dtype.kind in "fiub" and signal.samples.ndim == 1
     ]
@@ -37,7 +38,10 @@ def _mdf_group(file: Any, number: int) -> Group | None:
         if signal.name in names or not len(signal.samples):
             continue
         name = signal.name if signal.name not in columns else f"{signal.name}#{len(columns) + 1}"
-        columns[name] = signal.samples
+        invalid = signal.invalidation_bits
+        columns[name] = (
+            signal.samples if invalid is None else np.where(invalid, np.nan, signal.samples)
+        )
         if signal.unit:
             units[name] = signal.unit
     if not columns:
@@ -92,9 +96,7 @@ def _tdms_groups(group: Any, start: Any, several: bool, said: list[str]) -> Iter
 def _plain(plain: Raw, units: dict[str, str], name: str, said: list[str]) -> Iterator[Group]:
     """Channels without a waveform: on a channel of times, if the group has one."""
     clocks = [n for n, values in plain.items() if values.dtype.kind == "M"] or [
-        n
-        for n in plain
-        if n.rpartition("/")[2].lower().split(" ")[0].split("[")[0] in ("t", "time")
+        n for n in plain if TIME_WORD.search(n.rpartition("/")[2])
     ]
     if not clocks:
         said.append(f"left out, since they have no times: the channels of {name}")
@@ -103,6 +105,8 @@ def _plain(plain: Raw, units: dict[str, str], name: str, said: list[str]) -> Ite
     stamps = time.astype("datetime64[ns]").astype(np.int64) if time.dtype.kind == "M" else time
     unit = "ns" if time.dtype.kind == "M" else units.get(clocks[0], "")
     columns = {n: v for n, v in plain.items() if n != clocks[0] and len(v) == len(time)}
+    if short := [n for n in plain if n != clocks[0] and n not in columns]:
+        said.append(f"left out, since they are not as long as {clocks[0]}: {', '.join(short[:6])}")
     yield Group("", stamps, unit, columns, {n: u for n, u in units.items() if n in columns})
 
 

@@ -42,7 +42,8 @@ def read_db3(path: Path) -> Recording:
     if not any(topic.columns for topic in topics.values()):
         what = "; ".join(said) or "it has no messages"
         raise KembaError(str(path), f"has no message that kemba reads: {what}")
-    return recording([topic.group() for topic in topics.values() if topic.columns], said)
+    groups = [topic.group(said) for topic in topics.values() if topic.columns]
+    return recording(groups, said)
 
 
 def _take(file: Path, topics: dict[str, Topic], said: list[str]) -> None:

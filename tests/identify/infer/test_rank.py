@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.answer import ENDED, Answer, Ranked, Value, phrase
+from kemba.identify.answer import ENDED, HELD_OUT, Answer, Ranked, Value, phrase
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.infer.ranking import values
@@ -145,10 +145,14 @@ def test_a_significant_error_that_nothing_explains_is_not_called_small(
     assert verdict_on(NULL, None, found) == verdict
 
 
+@pytest.mark.parametrize(("split", "error"), [(HELD_OUT, "held-out error"), ("runs", "error")])
 @pytest.mark.parametrize(
     ("after", "said"), [(0.91, "falls from 0.96 to 0.91"), (0.97, "was 0.96 and is 0.97")]
 )
-def test_the_sentence_says_falls_only_where_the_error_falls(after: float, said: str) -> None:
+def test_the_sentence_says_falls_only_where_the_error_falls(
+    after: float, said: str, split: str, error: str
+) -> None:
+    """And calls it held-out only where logs were kept aside."""
     found = Answer(
         "missing",
         ranking=[Ranked("payload", 1.0, {})],
@@ -156,8 +160,9 @@ def test_the_sentence_says_falls_only_where_the_error_falls(after: float, said: 
         sure=("payload",),
         error_before=0.96,
         error_after=after,
+        split_by=split,
     )
-    assert f"the held-out error {said} times the noise" in phrase(found)
+    assert f"; the {error} {said} times the noise" in phrase(found)
 
 
 def test_a_part_of_an_answer_says_what_it_explains_and_what_is_left() -> None:

@@ -15,8 +15,13 @@ def log(step: float, jitter: float = 0.0, kind: str = "robot", *more: str) -> Tr
 
 @pytest.mark.parametrize(("step", "said"), [(2e-3, "500 Hz"), (5e-3, "200 Hz")])
 def test_a_slow_log_blurs_valve_edges(step: float, said: str) -> None:
-    (remark,) = limits_of([log(1e-3), log(step)])
+    (remark,) = limits_of([log(1e-3), log(step, 0.0, "robot", "front/valve/extend [1]")])
     assert remark.startswith(f"{said} blurs valve edges to {1e3 * step:.0f} ms")
+
+
+def test_valves_are_named_only_where_there_are_some() -> None:
+    (remark,) = limits_of([log(2e-3, 0.0, "drive")])
+    assert remark == "500 Hz: time constants below 2 ms do not show"
 
 
 def test_uneven_rows_are_told() -> None:

@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robot_logs import hops
 
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array
-from kemba.identify.robot.batch import ResampledLog
+from kemba.identify.robot.batch import Batch, ResampledLog
+from kemba.identify.robot.geometry import told_by_motion
 from kemba.identify.robot.mix_ups import mix_ups, mixed_up
 from kemba.identify.robot.physics import Physics
+from kemba.identify.robot.problem import RobotProblem
 from kemba.model.spec import load_model
 
 Change = Callable[[Array], Array]
@@ -129,6 +132,31 @@ def test_pistons_of_the_legs_are_told_from_the_pitch(
     y[:, [5, 6]] = y[:, [6, 5]]
     (fault,) = found(physics, replace(standing, y=y))
     assert "stand: piston/x of the legs is swapped; corrected" in str(fault)
+
+
+@pytest.mark.parametrize(("truth", "told"), [(-1, 1), (1, 0)])
+def test_whether_the_pitch_is_turned_is_told_by_the_motion(
+    truth: int, told: int, physics: Physics, standing: ResampledLog
+) -> None:
+    """Of a late sensor, feet may stand better with the pitch turned: then the model leaves more."""
+    log = changed(standing, physics, pitch=lambda p: truth * p)
+    off = lambda log: 1.0 + float(np.abs(log.y - standing.y).max())  # noqa: E731
+    said = told_by_motion(physics, Batch((log,)), off)
+    assert len(said) == told and all("body/pitch has the reversed sign" in text for text in said)
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_a_turned_pitch_is_neither_swapped_pistons_nor_a_late_sensor(late: bool) -> None:
+    """An even hop, of which feet alone take the one for the other; and one in which the robot tips
+    over, its body read 4 ms late."""
+    (hop, *_), _ = hops(runs=1, seed=4 if late else 0)
+    body = ("body/x [m]", "body/z [m]", "body/pitch [rad]")
+    lag = {h: np.interp(hop.time - 4e-3, hop.time, hop.columns[h]) for h in body}
+    turned = {body[2]: -hop.columns[body[2]]}
+    mixed = RobotProblem([hop.with_columns(lag if late else turned)], load_model("planning")).mixed
+    said = "; ".join(map(str, mixed))
+    assert not said if late else "body/pitch has the reversed sign" in said
+    assert "swapped" not in said
 
 
 def test_what_feet_cannot_tell_the_model_tells(physics: Physics, standing: ResampledLog) -> None:
