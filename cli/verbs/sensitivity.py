@@ -26,7 +26,7 @@ def sensitivity(
     """Say what small changes of height, supply, payload and every effect's numbers do.
 
     Columns `commands/...`: the same commands on the changed machine. Columns `replanned/...`: the
-    plan made anew, to first order.
+    plan made anew, its phases kept.
 
     Example: kemba-opt sensitivity runs/jump-1
     """

@@ -11,17 +11,17 @@ from kemba.errors import KembaError
 from kemba.files import atomic_text
 from kemba.model import Model
 from kemba.ocp import load_task, task_model
+from kemba.ocp.continuation.origin import read_stages
+from kemba.ocp.phases.stages import Stages
 from kemba.ocp.task.task import Task
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute_many
-from kemba.runs import load_run
+from kemba.runs import STAGES, load_run
 from kemba.sensitivity.replanned import (
     FigureStep,
-    PlanProgram,
     Replanned,
     figures,
     of_plan,
-    solution,
 )
 from kemba.trajectory import Trajectory
 
@@ -92,7 +92,7 @@ HEADER = (
 class Sensitivity:
     """What one step of every figure changes; None where there is no answer.
 
-    `unsolved`: why the plan could not be differentiated, empty where it was.
+    `unsolved`: why the plan could not be made anew, empty where it was.
     """
 
     figures: tuple[FigureStep, ...]
@@ -108,11 +108,12 @@ def sensitivity(
     table: Trajectory,
     tell: Callable[[str], None] = lambda text: None,
     only: Sequence[str] = (),
+    stages: Stages | None = None,
 ) -> Sensitivity:
     """Both kinds for the figures of a task and its `model`; `only`: the names of those wanted.
 
-    `table`: the controller's table of the `plan`. Raises KembaError where it cannot be executed,
-    and where there is no such figure.
+    `table`: the controller's table of the `plan`; `stages`: its solved program. Raises
+    KembaError where it cannot be executed, and where there is no such figure.
     """
     listed = figures(task, model, only)
     machine = [figure for figure in listed if figure.machine]
@@ -121,8 +122,7 @@ def sensitivity(
     commands = tuple(next(executed) if figure.machine else None for figure in listed)
     tell("the plan made anew")
     try:
-        source = PlanProgram.of(task, model, plan)
-        replanned: list[Replanned | None] = [*of_plan(solution(source, task, model), listed)]
+        replanned: list[Replanned | None] = [*of_plan(task, model, plan, stages, listed)]
         why = ""
     except KembaError as error:
         replanned, why = [None] * len(listed), str(error)
@@ -161,4 +161,5 @@ def sensitivity_of_run(
     found = load_run(run)
     task, document = load_task(found.task)
     model, plan = task_model(task, document=document), found.trajectory
-    return sensitivity(task, model, plan, found.controller, tell, only=only)
+    stages = read_stages(found.path / STAGES)
+    return sensitivity(task, model, plan, found.controller, tell, only, stages)
