@@ -22,7 +22,7 @@ def export(
     ] = None,
     source_map: Annotated[
         str | None,
-        typer.Option("--from", help="Column map YAML of the program that wrote the log."),
+        typer.Option("--source-map", help="Column map YAML of the program that wrote the log."),
     ] = None,
     nlp: Annotated[
         bool, typer.Option("--nlp", help="Write the optimisation programs as CasADi functions.")

@@ -19,7 +19,6 @@ SMALL = {
     "benchmarks/reading_logs.py": ["--minutes", "0.1", "--formats", "csv", "--repeats", "1"],
     "benchmarks/requirements.py": ["--draws", "1", "--each", "1", "--limit", "1"],
     "benchmarks/scaling.py": ["--nodes", "20", "40", "--repeats", "1"],
-    "benchmarks/sensitivity.py": ["--report"],
     "benchmarks/waiting.py": ["--cases", "1", "--times", "1"],
 }
 

@@ -141,7 +141,7 @@ def test_another_programs_columns_come_back(run: Path, tmp_path: Path) -> None:
     drawn = ("plot", str(out), "--map", str(tmp_path / "other.yaml"), "--save", str(figure))
     assert call(*drawn).exit_code == 0 and figure.is_file()
     back = tmp_path / "back.npz"
-    given = ("export", str(out), "--from", str(tmp_path / "other.yaml"), "--out", str(back))
+    given = ("export", str(out), "--source-map", str(tmp_path / "other.yaml"), "--out", str(back))
     assert call(*given).exit_code == 0
     np.testing.assert_allclose(open_log(back)["rear/hip/q"], plan["rear/hip/q"], atol=1e-12)
     page = tmp_path / "foreign.html"
