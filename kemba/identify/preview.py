@@ -28,10 +28,10 @@ class Preview:
 
     def json(self) -> dict[str, Any]:
         """The object that `--json` prints; sizes by effect and parameter, as in an answer."""
-        told = self.told
+        told, by = self.told, self.switches
         return {
-            "smallest_detectable": {e: {self.switches[e].name: told.sizes[e]} for e in told.sizes},
-            "usual": {e: {p.name: p.size} for e, p in self.switches.items()},
+            "smallest_detectable": {e: {by[e].name: size} for e, size in told.sizes.items()},
+            "usual": {e: {p.name: p.size} for e, p in by.items()},
             "shown": list(told.shown),
             "alike": [list(group) for group in told.alike],
             "tests": [vars(test) for test in self.tests],

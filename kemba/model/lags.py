@@ -18,6 +18,6 @@ def with_lags(model: Model) -> Model | None:
         name: tuple(area * gauge for gauge in first.gauge)
         for name, area in (("F_extend", cylinder.area_extend), ("F_retract", cylinder.area_retract))
     }
-    lag = Chamber(pressures=first.pressures, **steady)
     kept = [e for e in model.effects if not isinstance(e, PHYSICAL) and "gas" not in e.needs]
-    return Model(model.mechanism, [*kept, lag, ModeDamping()], model.supply, model.name)
+    new = Chamber(pressures=first.pressures, **steady), ModeDamping()
+    return Model(model.mechanism, [*kept, *new], model.supply, model.name)

@@ -6,7 +6,7 @@ are stiff: air that flows between nearly equal pressures answers within a fifth 
 """
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import casadi as ca
@@ -15,16 +15,9 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.model.model import Model, Node
 from kemba.quantity import Quantity
+from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-
-
-class ByName(Protocol):
-    """Values (n,) by name."""
-
-    def __contains__(self, name: str, /) -> bool: ...
-
-    def __getitem__(self, name: str, /) -> Array: ...
 
 
 # s; time after which states count as at rest; a leak would empty any tank in the end (ten times
@@ -129,7 +122,7 @@ def at_rest(model: Model, q: Any, u: Any) -> Array:
     return _KNOWN[model](q, u)
 
 
-def told_by(model: Model, s: Array, plan: ByName) -> dict[int, Array]:
+def told_by(model: Model, s: Array, plan: Trajectory) -> dict[int, Array]:
     """Effect states (n,), by their number, that follow from what a plan has of the model's outputs:
     the pressure of a chamber from its force. Outputs are linear in such a state; `s` (ns,): where
     the slope is taken. States that the plan itself has are left out."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 from kemba.model import Model
 from kemba.ocp.infeasibility.elastic import Outcome, elastic
@@ -43,19 +42,12 @@ def grids(nodes: int) -> list[int]:
     return found
 
 
-class LaggedModel(NamedTuple):
-    """A task's model with first-order chambers in the place of physical ones, and what is asked of
-    it."""
-
-    model: Model
-    requirements: list[Requirement]
-
-
 @dataclass
 class Planner:
     """Builds programs of one task on demand and solves them by a list of strategies.
 
-    `lags`: on which plans are sought before they are refined on the model itself.
+    `lags`: the model with first-order chambers in the place of physical ones, and what is asked of
+    it; plans are sought on it before they are refined on the model itself.
     """
 
     task: Task
@@ -65,14 +57,15 @@ class Planner:
     start: Trajectory | None = None
     pulse: float = 0.0  # [s], of valves that are sought; the task's dwell where that is more
     outcome: Outcome | None = None  # of the elastic solve after a failure
-    lags: LaggedModel | None = None
+    lags: tuple[Model, list[Requirement]] | None = None
 
     @property
     def seeking(self) -> Planner:
         """The planner of the model on which plans are sought."""
         if self.lags is None:
             return self
-        return replace(self, model=self.lags.model, requirements=self.lags.requirements, lags=None)
+        model, requirements = self.lags
+        return replace(self, model=model, requirements=requirements, lags=None)
 
     def schedule(self, nodes: int, reduction: Reduction) -> Schedule:
         """A fresh program on a grid of `nodes`; of half a robot, for what is asked of both legs

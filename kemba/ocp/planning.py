@@ -28,7 +28,7 @@ from kemba.ocp.infeasibility.diagnostic import Diagnostic
 from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
 from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
-from kemba.ocp.planner import LaggedModel, Planner
+from kemba.ocp.planner import Planner
 from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
@@ -82,10 +82,10 @@ class Planning:
                 task, built, requirements = as_one(asked, document)
             else:
                 built, requirements = asked_of(asked, document, model)
-            lags: LaggedModel | None = None
+            lags: tuple[Model, list[Requirement]] | None = None
             if task.refine == "radau" and start is None and with_lags(built) is not None:
                 many = as_one(asked, document, lags=True)[1:] if asked.sequence else None
-                lags = LaggedModel(*(many or asked_of(asked, document, model, lags=True)))
+                lags = many or asked_of(asked, document, model, lags=True)
         session = Session(Control(deadline, log, watch, stop), tell, building=building)
         return cls(document, Planner(task, built, requirements, session, start, lags=lags), clock)
 

@@ -11,6 +11,11 @@ from math import comb
 
 import numpy as np
 
+from kemba.errors import KembaError
+from kemba.events import PLANNED, read
+from kemba.model import Model
+from kemba.plant.certificate import begins_moving, moving_start, rest_after
+from kemba.plant.controller import execute
 from kemba.plant.kernel.machine import Array
 from kemba.trajectory import Trajectory
 
@@ -98,12 +103,6 @@ class ExecutedTable:
     signed: Array
     error: float
 
-    @property
-    def lands(self) -> bool:
-        """Whether it can be compared with others: it was simulated, and falls only where the plan
-        does."""
-        return self.error < FALLEN
-
 
 @dataclass
 class Roundings:
@@ -143,9 +142,10 @@ class Roundings:
             effects.done(ticks)
             table = with_moved(start.table, groups, ticks)
             found = self.tried(table) if table is not None else None
-            if found is None or not found.lands:
+            if found is None or found.error >= FALLEN:
                 continue
-            if start.lands and found.signed.shape == start.signed.shape:  # the same flights
+            same = found.signed.shape == start.signed.shape  # the same flights
+            if same and start.error < FALLEN:
                 effects.seen(ticks, found.signed, alone)
             if found.error < best.error:
                 best = found
@@ -186,6 +186,29 @@ class _Effects:
             self.slopes[alone] = signed - self.start
         if np.abs(signed).max() < np.abs(self.nearest).max():
             self.nearest, self.there = signed, ticks
+
+
+NEAR = (0.5e-3, 1e-3, 0.01)  # m, s, m; errors of apex, touchdown and end that need no search
+EXECUTIONS = 24  # at most: edges on ticks of the plan cost as much
+
+
+def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
+    """The table of a plan, or one with edges some ticks away whose execution on `model` is nearer
+    to it. Edges after the landing stay."""
+    start = moving_start(model, plan) if begins_moving(model, plan) else None
+    rest, (apex, touchdown, end) = rest_after(model, plan, table), NEAR
+
+    def run(other: Trajectory) -> ExecutedTable:
+        try:
+            done = execute(other, model, extra=rest, start=start).against(model, plan)
+        except KembaError:
+            return ExecutedTable(other, np.full(2, np.inf), np.inf)
+        signed = np.array([done.apex_error_m / apex, (done.touchdown_error_s or 0.0) / touchdown])
+        error = float(max(np.abs(signed).max(), done.final_error_m / end))
+        return ExecutedTable(other, signed, error + (0.0 if done.landed else FALLEN))
+
+    landing = read(plan, PLANNED, model.mechanism.weight, plan.time - plan.time[0]).landing
+    return Roundings(run, EXECUTIONS).best(table, landing).table
 
 
 def _earliest(table: Trajectory, group: Group) -> float:

@@ -14,6 +14,7 @@ from kemba.ocp import Plan, Task, controller_table
 from kemba.ocp.certificate.asked import grip_of
 from kemba.ocp.certificate.status import Status
 from kemba.plant.equations import share_equations
+from kemba.plant.retiming import retimed
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, Share, outcomes, share_of
 from kemba.solve.judged import judged, plant_of
@@ -126,6 +127,7 @@ class _Search:
         for hold in sorted({own, max(own, HOLD)}):
             held = replace(found, task=found.task.model_copy(update={"hold": hold}))
             table = controller_table(held.model, held.trajectory, hold)
+            table = retimed(held.model, held.trajectory, table)
             good = judged(held, table, self.plant).good
             one = RobustCandidate(held, f"{name}, hold {hold:g} s", table, (), good)
             one = self._executed(one, FEW)

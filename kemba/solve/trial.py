@@ -11,6 +11,7 @@ from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, carried_over, lacking
+from kemba.plant.retiming import retimed
 from kemba.plant.simulate import wait_for_compiler
 from kemba.scenarios.share import Share
 from kemba.solve.judged import Judged, judged
@@ -116,6 +117,8 @@ def executed(
     if table is None or not execution.replay or not found.status.plan:
         return Trial(found, result, Motions(table), repair=repair)
     wait_for_compiler(execution.tell)
+    if share is None:
+        table = retimed(found.model, found.trajectory, table)
     trial = Trial(found, result, Motions(table), repair=repair)
     try:
         done = judged(found, table, tell=execution.tell)

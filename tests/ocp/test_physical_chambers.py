@@ -14,7 +14,7 @@ def planning() -> Planning:
 
 def test_what_is_asked_of_pressures_is_asked_of_forces_while_a_plan_is_sought() -> None:
     p = planning().planner
-    assert p.lags is not None and p.seeking.model is p.lags.model
+    assert p.lags is not None and p.seeking.model is p.lags[0]
     names = {r.quantity.name for r in p.requirements}
     sought = {r.quantity.name for r in p.seeking.requirements}
     assert "front/chamber/extend/P" in names - sought

@@ -3,12 +3,15 @@
 import numpy as np
 from ocp.runs import solved
 
-from kemba.ocp import controller_table
+from kemba.ocp import controller_table, load_task
+from kemba.ocp.planning import plan
+from kemba.plant.controller import execute
 from kemba.plant.retiming import (
     ExecutedTable,
     Roundings,
     edges_of,
     moves,
+    retimed,
     shared_edges,
     with_moved,
 )
@@ -35,6 +38,18 @@ def test_two_late_edges_of_all_legs_are_found_in_few_executions() -> None:
     assert tried[0] > 1.0 >= mended.error and len(tried) <= 2 + len(groups)
     assert edges_of(mended.table) == edges_of(table)
     assert Roundings(executed, 24).best(table, np.inf).table is table, "it is near enough"
+
+
+def test_a_table_with_late_edges_comes_nearer_to_its_plan() -> None:
+    found = plan(*load_task("jump.yaml", ["height=0.48 m"]))
+    table = controller_table(found.model, found.trajectory)
+    spoilt = with_moved(table, shared_edges(table)[:2], (1, 1))
+    assert spoilt is not None
+    mended = retimed(found.model, found.trajectory, spoilt)
+    both = (execute(t, found.model) for t in (spoilt, mended))
+    errors = [done.against(found.model, found.trajectory) for done in both]
+    assert abs(errors[1].apex_error_m) < 0.7 * abs(errors[0].apex_error_m)
+    assert all(set(np.unique(mended[c])) <= {0.0, 1.0} for c in edges_of(table))
 
 
 def test_moves_are_all_different_and_move_something() -> None:

@@ -1,7 +1,7 @@
 """The standard test that tells effects apart which logs cannot: of a piston on a rig, or a sway of
 the robot."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kemba.errors import enumerated
@@ -35,19 +35,16 @@ class SplittingTest:
 def splitting_test(model: str, problem: Problem, effects: Sequence[str]) -> SplittingTest:
     """The standard test for effects of a problem of `model`, a YAML or a shipped name."""
     rivals = Rivals({e: problem.candidates[e].typical() for e in effects}, {})
-    found = [
-        SplittingTest(effects, test, evidence.least, log_s)
-        for test, log_s, evidence in _menu(model, rivals)
-        if len(evidence.nats) == len(effects) - 1
-    ]
-    return max(found, key=lambda test: test.nats, default=SplittingTest(effects))
-
-
-def _menu(model: str, rivals: Rivals) -> Iterator[tuple[str, float, Separation]]:
-    """Every standard test: its name, seconds of log, evidence."""
     piston, robot = load_model(model, rig=True), load_model(model)
+    menu: list[tuple[str, float, Separation]] = []
     if not piston.mechanism.rig:  # of one's own rigs none is known
-        for one in judged_menu(VirtualBench(piston, ExperimentSettings.coarse), rivals):
-            yield f"the rig test '{one.rig.name}'", one.log_s, one.evidence
+        judged = judged_menu(VirtualBench(piston, ExperimentSettings.coarse), rivals)
+        menu = [(f"the rig test '{one.rig.name}'", one.log_s, one.evidence) for one in judged]
     if len(robot.mechanism.legs) > 1 and (sway := try_out(robot, STANDARD, rivals)):
-        yield "a slow sway of the robot", sway.log_s, sway.evidence
+        menu.append(("a slow sway of the robot", sway.log_s, sway.evidence))
+    found = (
+        SplittingTest(effects, test, evidence.least, log_s)
+        for test, log_s, evidence in menu
+        if len(evidence.nats) == len(effects) - 1
+    )
+    return max(found, key=lambda test: test.nats, default=SplittingTest(effects))

@@ -25,8 +25,7 @@ class Identifiability:
 
     `sizes`: effect -> the smallest size [unit of its switch] that shows nine times in ten, None
     where none does. `shown`: those that show at their usual size. `alike`: groups of these, each of
-    which has too little evidence against another one.
-    """
+    which has too little evidence against another one."""
 
     sizes: Mapping[str, float | None]
     shown: Sequence[str]
@@ -45,7 +44,7 @@ def identifiability(ranker: Ranker, sizes: Mapping[str, float | None]) -> Identi
     usual = {e: ranker.candidates[e].lead.size for e in sizes}
     shown = [e for e, size in sizes.items() if size is not None and size <= usual[e]]
     count, labels = connected_components(expected(ranker, shown) < CLEAR, directed=False)
-    groups = [[e for e, k in zip(shown, labels, strict=True) if k == own] for own in range(count)]
+    groups = ([e for e, k in zip(shown, labels, strict=True) if k == own] for own in range(count))
     return Identifiability(sizes, shown, [group for group in groups if len(group) > 1])
 
 

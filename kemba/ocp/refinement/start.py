@@ -145,26 +145,22 @@ ROUNDS = 4  # of rows between nodes; what is missed after two is little
 
 
 def solve_along(
-    program: PhaseProgram,
-    start: Iterate,
-    options: dict[str, Any],
-    control: Control,
-    stagnation: Stagnation | None = None,
+    program: PhaseProgram, start: Iterate, options: dict[str, Any], *more: Any
 ) -> Iterate:
     """The same, and again with rows between nodes wherever the solution misses there what holds
     along the motion. Where that has no solution near, the last one that was found."""
-    found = solve(program, start, options, control, stagnation)
+    found = solve(program, start, options, *more)
     spent = found.iterations
     for _ in range(ROUNDS):
         known = program.added
         if not found.solved or not add_missed(program, found.Y):
             break
-        more = solve(program, Iterate(found.Y), warm(options["max_iter"]), control, stagnation)
-        spent += more.iterations
-        if not more.solved:
+        again = solve(program, Iterate(found.Y), warm(options["max_iter"]), *more)
+        spent += again.iterations
+        if not again.solved:
             program.reset(known)
             break
-        found = more
+        found = again
     return replace(found, iterations=spent)
 
 
