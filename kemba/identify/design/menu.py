@@ -1,5 +1,4 @@
-"""The standard test that tells effects apart which logs cannot: of a piston on a rig, or a sway of
-the robot."""
+"""The standard test, of a piston on a rig or of the robot, that tells alike effects apart."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

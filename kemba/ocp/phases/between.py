@@ -19,13 +19,12 @@ from kemba.ocp.task.requirement import SCALES, quantity_expression
 from kemba.ocp.transcription.layout import STEP
 
 SHARES = (0.25, 0.5, 0.75)  # of an element: where the certificate looks
-HALF = 0.5  # of what the certificate allows there: what is missed by more is asked for
+HALF = 0.5  # of what it allows there: what is missed by more is asked for
 
 
 @dataclass(frozen=True)
 class Along:
-    """low <= g <= high, scaled, of the coordinates along some elements; `allowed`: by how much it
-    may be missed between nodes."""
+    """low <= g <= high, scaled, along elements; `allowed`: what may be missed between nodes."""
 
     label: str
     g: ca.SX
