@@ -128,7 +128,7 @@ def told_by(model: Model, s: Array, plan: Trajectory) -> dict[int, Array]:
     the slope is taken. States that the plan itself has are left out."""
     node, found = model.node, dict[int, Array]()
     unknown = {str(node.s[i]): i for i, q in enumerate(model.states.values()) if q.name not in plan}
-    for name, value in node.outputs.items():
+    for name, value in node.outputs.items() if unknown else ():
         symbols = {str(symbol) for symbol in ca.symvar(ca.SX(value))}
         if name in plan and len(symbols) == 1 and (own := symbols & set(unknown)):
             i = unknown[own.pop()]

@@ -44,6 +44,13 @@ def moving_start(machine: Model, plan: Trajectory) -> dict[str, float]:
     return {**{name: float(value) for name, value in zip(names, s, strict=True)}, **found}
 
 
+def played(machine: Model, plan: Trajectory, table: Trajectory, rest: float) -> Replay:
+    """A plan's table on a machine, from the plan's start where it begins in motion; the last
+    commands stay for `rest` [s]."""
+    start = moving_start(machine, plan) if begins_moving(machine, plan) else None
+    return execute(table, machine, extra=rest, start=start).against(machine, plan)
+
+
 SLOW = 0.01  # m/s; slower ones are no news
 OBSTACLES = {
     "contact:gap": "foot on the ground",
@@ -99,14 +106,8 @@ def executions(
     full = load_model(plant) if isinstance(plant, str) else plant
     rest = rest_after(model, plan, controller)
 
-    moving = begins_moving(model, plan)
-
     def on(machine: Model) -> Replay | None:
-        def executed() -> Replay:
-            start = moving_start(machine, plan) if moving else None
-            return execute(controller, machine, extra=rest, start=start).against(machine, plan)
-
-        return _tried(executed)
+        return _tried(lambda: played(machine, plan, controller, rest))
 
     tell(Stage("replay: the plan's inputs", 1, 3))
     own = _tried(lambda: replay(model, plan))

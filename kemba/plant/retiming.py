@@ -14,8 +14,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.events import PLANNED, read
 from kemba.model import Model
-from kemba.plant.certificate import begins_moving, moving_start, rest_after
-from kemba.plant.controller import execute
+from kemba.plant.certificate import played, rest_after
 from kemba.plant.kernel.machine import Array
 from kemba.trajectory import Trajectory
 
@@ -112,13 +111,12 @@ class Roundings:
     left: int
 
     def best(self, table: Trajectory, last: float) -> ExecutedTable:
-        """The table, or the best of those with edges some ticks away; edges after `last` [s]
-        stay, none where it is NaN."""
+        """The table, or the best of those with edges up to `last` [s] some ticks away."""
         best, before = self.tried(table), np.inf
         while 1.0 < best.error < before and self.left > 0:
             before = best.error
             for edges in (shared_edges(table), single_edges(table)):
-                groups = [group for group in edges if not _earliest(table, group) > last]
+                groups = [group for group in edges if _earliest(table, group) <= last]
                 if groups:
                     best = self.around(best, groups)
         return best
@@ -194,24 +192,23 @@ EXECUTIONS = 24  # at most: edges on ticks of the plan cost as much
 
 def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
     """The table of a plan, or one with edges some ticks away whose execution on `model` is nearer
-    to it. Edges after the landing stay."""
-    start = moving_start(model, plan) if begins_moving(model, plan) else None
+    to it. Edges after the last landing stay."""
     rest, (apex, touchdown, end) = rest_after(model, plan, table), NEAR
 
     def run(other: Trajectory) -> ExecutedTable:
         try:
-            done = execute(other, model, extra=rest, start=start).against(model, plan)
+            done = played(model, plan, other, rest)
         except KembaError:
             return ExecutedTable(other, np.full(2, np.inf), np.inf)
         signed = np.array([done.apex_error_m / apex, (done.touchdown_error_s or 0.0) / touchdown])
         error = float(max(np.abs(signed).max(), done.final_error_m / end))
         return ExecutedTable(other, signed, error + (0.0 if done.landed else FALLEN))
 
-    landing = read(plan, PLANNED, model.mechanism.weight, plan.time - plan.time[0]).landing
-    return Roundings(run, EXECUTIONS).best(table, landing).table
+    course = read(plan, PLANNED, model.mechanism.weight, plan.time - plan.time[0])
+    last = max((flight.end for flight in course.flights), default=np.inf)
+    return Roundings(run, EXECUTIONS).best(table, last).table
 
 
 def _earliest(table: Trajectory, group: Group) -> float:
     """When [s] the first edge of a group comes."""
-    edges = edges_of(table)
-    return float(min(table.time[edges[name][k]] for name, k in group))
+    return float(min(table.time[edges_of(table)[name][k]] for name, k in group))

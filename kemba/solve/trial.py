@@ -20,7 +20,7 @@ from kemba.trajectory import Array, Trajectory
 
 AIR = (
     "the simulated robot has physical chambers, and this plan has first-order ones: plan with "
-    "--model orifice, or with `chambers: orifice` in a model of your own"
+    "--model orifice on the shipped robot, with `chambers: orifice` in the model of another"
 )
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
@@ -118,6 +118,7 @@ def executed(
         return Trial(found, result, Motions(table), repair=repair)
     wait_for_compiler(execution.tell)
     if share is None:
+        execution.tell("replay: the times of controller.csv")
         table = retimed(found.model, found.trajectory, table)
     trial = Trial(found, result, Motions(table), repair=repair)
     try:

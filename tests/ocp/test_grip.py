@@ -12,6 +12,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import plan
 from kemba.ocp.reading import asked_of
 from kemba.plant.controller import execute
+from kemba.plant.retiming import retimed
 from kemba.solve.judged import judged, plant_of
 from kemba.trajectory import Trajectory
 
@@ -33,14 +34,15 @@ def test_a_plan_keeps_to_its_share_of_the_friction() -> None:
 
 
 def table_of(found: Plan) -> Trajectory:
-    return controller_table(found.model, found.trajectory, found.task.hold)
+    table = controller_table(found.model, found.trajectory, found.task.hold)
+    return retimed(found.model, found.trajectory, table)
 
 
 def test_it_is_planned_and_judged_on_the_ground_of_its_model() -> None:
     found = high(0.5)
     assert found.model.effect("contact").value("mu") == 1.0
     assert plant_of(found.task).effect("contact").value("mu") == 1.0
-    assert judged(found, table_of(found)).verdicts["replay"].good
+    assert judged(found, table_of(found)).replays
 
 
 @pytest.mark.parametrize(("grip", "slips"), [(1.0, True), (0.5, False)])

@@ -4,7 +4,7 @@ If A is there and B is fitted, the fit of B stays away from the prediction of A.
 distance that is left, in units of the noise, is the expected logarithm of the Bayes factor. What
 may bend to help B are its own parameters, and within their priors the nominal figures of the model
 and how each log begins; all by their slopes. Of 50 pairs on standard tests a fit by three confirmed
-steps settles the same.
+steps settled the same (by hand).
 """
 
 from collections.abc import Mapping
