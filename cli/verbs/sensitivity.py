@@ -23,7 +23,7 @@ def sensitivity(
     json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say what small changes of height, supply, payload and every effect's numbers do.
+    """Write as CSV what small changes of height, supply, payload and every effect's numbers do.
 
     Columns `commands/...`: the same commands on the changed machine. Columns `replanned/...`: the
     plan made anew, its phases kept.
