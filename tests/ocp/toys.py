@@ -1,14 +1,14 @@
 """Small mechanisms with known motions, through the same Transcription as the robot."""
 
 import math
-from collections.abc import Iterable
-from typing import ClassVar, Literal
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Annotated, ClassVar, Literal
 
 import casadi as ca
 import numpy as np
 
 from kemba.config import Document
-from kemba.effects.base import At, Contribution, Effect
+from kemba.effects.base import At, Contribution, Effect, Pair
 from kemba.mechanism import Mechanism, Port
 from kemba.model import Model
 from kemba.ocp.nlp.ipopt import Ipopt, Iterate
@@ -16,7 +16,8 @@ from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Parameters, Transcription
-from kemba.quantity import Quantity
+from kemba.quantity import Param, Quantity
+from kemba.scene.scene import Obstacle, Scene
 
 SHARP = {"tol": 1e-10, "constr_viol_tol": 1e-11, "acceptable_iter": 0}
 
@@ -74,8 +75,52 @@ class Wire(Effect):
         return Contribution(effort={"body_x": -at.c * at.body_z.v, "body_z": at.c * at.body_x.v})
 
 
-def bead(axes: str = "x", gravity: float = 0.0) -> Mechanism:
-    """A point of 1 kg that moves along `axes`, and falls along z."""
+class Leg(Effect):
+    """A push of at most `F` upwards, without a reach of its own."""
+
+    kind: Literal["leg"] = "leg"
+    place: ClassVar[Literal["leg", "body"]] = "body"
+    ports: ClassVar[tuple[str, ...]] = ("body_z",)
+    F: Annotated[float, Param("N", lower=0.0)] = 100.0
+
+    def inputs(self) -> dict[str, Quantity]:
+        return {"f": Quantity("leg/F", "N", 0.0, float(self.F), 10.0)}
+
+    def evaluate(self, at: At) -> Contribution:
+        return Contribution(effort={"body_z": at.f})
+
+
+class Stroke(Leg):
+    """The same from a piston below the mass: it pushes up to z = `s`, not beyond."""
+
+    kind: Literal["stroke"] = "stroke"  # type: ignore[assignment]
+    s: Annotated[float, Param("m", lower=0.0)] = 0.1
+
+    def forces(self) -> dict[str, Quantity]:
+        return {"over": Quantity("stroke/over", "m", 0.0, 10.0, doc="height above the stroke")}
+
+    def evaluate(self, at: At) -> Contribution:
+        beyond = Pair("beyond", at.over - (at.body_z.x - self.s), at.over)
+        return Contribution(effort={"body_z": at.f}, pairs=(beyond, Pair("no push", at.f, at.over)))
+
+
+class Wall(Effect):
+    """A wall at x = 1 m that does not throw back."""
+
+    kind: Literal["wall"] = "wall"
+    place: ClassVar[Literal["leg", "body"]] = "body"
+    ports: ClassVar[tuple[str, ...]] = ("body_x",)
+
+    def forces(self) -> dict[str, Quantity]:
+        return {"lam": Quantity("wall/F", "N", 0.0, 1000.0, 1.0)}
+
+    def evaluate(self, at: At) -> Contribution:
+        gap = Pair("wall", 1.0 - at.body_x.x, at.lam)
+        return Contribution(effort={"body_x": -at.lam}, pairs=(gap,))
+
+
+def bead(axes: str = "x", gravity: float = 0.0, box: Obstacle | None = None) -> Mechanism:
+    """A point of 1 kg that moves along `axes`, falls along z, and keeps out of a box."""
     n = len(axes)
     q, v, a = ca.SX.sym("q", n), ca.SX.sym("v", n), ca.SX.sym("a", n)
     coordinates = tuple(Quantity(f"body/{axis}", "m", -10.0, 10.0) for axis in axes)
@@ -83,22 +128,32 @@ def bead(axes: str = "x", gravity: float = 0.0) -> Mechanism:
     weight = ca.SX([gravity if axis == "z" else 0.0 for axis in axes])
     named = zip(coordinates, velocities, strict=True)
     ports = {c.name: Port(c, w, q[i]) for i, (c, w) in enumerate(named)}
-    return Mechanism("bead", q, v, a, coordinates, velocities, a + weight, ports, (), gravity=9.81)
+    scene = Scene(obstacles=(box,) if box else ())
+    for room in [box.room(scene.ground, q[0], q[1])] if box else []:
+        port = Port(Quantity("bead/room", "m"), Quantity("bead/room_rate", "m.s-1"), room)
+        ports["bead/room"] = port
+    known = coordinates, velocities, a + weight, ports, ()
+    return Mechanism("bead", q, v, a, *known, gravity=9.81, scene=scene)
 
 
 def solve(
-    mechanism: Mechanism, effects: Iterable[Effect], start: dict[str, float], **task: object
+    mechanism: Mechanism,
+    effects: Iterable[Effect],
+    start: dict[str, float],
+    relaxed: Sequence[float] = (),
+    near: Mapping[str, float] | None = None,
+    **task: object,
 ) -> tuple[Transcription, Iterate]:
-    """The task solved from straight lines between its start and its end."""
+    """The task solved from straight lines between its start and its end, or an end `near` that is
+    not asked for, first with pairs `relaxed` by so much one after the other."""
     document = Document({"start": start, **task})
     wanted = Task.model_validate(document.data)
     model = Model(mechanism, effects)
     requirements = resolve(wanted, model, document)
     program = Transcription(model, wanted, requirements, whole(model.node), wanted.nodes)
-    ends = {
-        c.name: float(wanted.end[c.name].equals or 0.0) if c.name in wanted.end else start[c.name]
-        for c in mechanism.coordinates
-    }
+    asked = {name: float(bound.equals or 0.0) for name, bound in wanted.end.items()}
+    known = {**start, **asked, **(near or {})}
+    ends = {c.name: known[c.name] for c in mechanism.coordinates}
     ramp = np.linspace(0.0, 1.0, wanted.nodes + 1)
     q = np.array([start[n] + (ends[n] - start[n]) * ramp for n in ends]).T
     groups = {
@@ -109,7 +164,8 @@ def solve(
         "lam": np.zeros((len(q), len(model.forces))),
         "h": np.full((len(q), 1), wanted.step),
     }
-    guess = Iterate(np.clip(program.layout.pack(groups), program.lower, program.upper))
-    found = Ipopt(program, SHARP).solve(guess, Parameters(eps=0.0).vector(program.nodes))
-    assert found.solved, found.ending
+    found = Iterate(np.clip(program.layout.pack(groups), program.lower, program.upper))
+    for eps in (*relaxed, 0.0):
+        found = Ipopt(program, SHARP).solve(found, Parameters(eps=eps).vector(program.nodes))
+        assert found.solved, found.ending
     return program, found
