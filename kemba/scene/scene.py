@@ -173,6 +173,15 @@ class Ground:
         size = (1 + slope**2) ** 0.5
         return -slope / size, 1 / size
 
+    def depth(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """How deep [m] points (n,) are in the ground, 0 above it: the way to the nearest point of
+        its surface within 10 cm, which at a wall is far less than that to the top."""
+        below = np.maximum(self.height(x) - z, 0.0)
+        for aside in np.linspace(-0.1, 0.1, 101) if self.level is None else ():
+            way = np.hypot(aside, np.maximum(self.height(x + aside) - z, 0.0))
+            below = np.minimum(below, way)
+        return below
+
     def friction(self, x: Any, usual: Any) -> Any:
         """Friction coefficient at x, `usual` where no line says one."""
         mu = last = usual

@@ -56,6 +56,16 @@ def test_numbers_arrays_and_symbols_agree_with_finite_derivatives() -> None:
     assert ground.height(0.5) == pytest.approx(0.15)
 
 
+def test_a_point_in_a_wall_is_as_deep_as_the_way_out() -> None:
+    """5 mm behind a wall of 15 cm, 10 cm below its top; in level ground and above any."""
+    ground = scene_in({"terrain": HOUSE["terrain"][:1]}).ground
+    x, z = np.array([0.455, 1.0, 0.0, 0.2]), np.array([0.05, 0.12, 0.01, -0.03])
+    deep = ground.depth(x, z)
+    assert 0.005 < deep[0] < 0.025  # the edge is rounded over 2 cm
+    assert deep[1:] == pytest.approx([0.03, 0.0, 0.03], abs=1e-9)
+    assert FLAT.ground.depth(x, z) == pytest.approx([0.0, 0.0, 0.0, 0.03])
+
+
 def test_level_ground_is_plain_numbers() -> None:
     assert FLAT.ground.height(PLACES) == 0.0 and FLAT.ground.normal(ca.SX.sym("x")) == (0.0, 1.0)
     raised = scene_in({"terrain": [{"height": "0.37 m"}]})

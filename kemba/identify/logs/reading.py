@@ -61,7 +61,7 @@ RANGES = {
     "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),
     "hip/q": (-2 * math.pi, 2 * math.pi, "radians; is it in degrees?"),
     "hip/tau": (-60.0, 60.0, "newton metres at the joint; is it in N.mm?"),
-    "body/pitch": (-math.pi, math.pi, "radians, nose up positive; is it in degrees?"),
+    "body/pitch": (-3 * math.pi, 3 * math.pi, "radians, nose up positive; is it in degrees?"),
     "body/x": (-20.0, 20.0, "metres; is it in millimetres?"),
     "body/z": (
         -0.1,

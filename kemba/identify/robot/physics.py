@@ -207,18 +207,18 @@ class Physics:
         return made
 
     def _feet(self) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Of every foot: place x and height above its ground (2 legs,); their rates and slopes
-        (2 legs, n) along the ground and out of it."""
+        """Of every foot: place x and distance from the ground, which at a wall is far less than
+        the height above it (2 legs,); their rates and slopes (2 legs, n) along the ground and out
+        of it."""
         node, ground, found = self.node, self.mechanism.scene.ground, []
         for leg in self.legs:
-            x, z = (node.outputs[f"{leg}/foot/{axis}"] for axis in "xz")
+            foot = ca.vertcat(*(node.outputs[f"{leg}/foot/{axis}"] for axis in "xz"))
+            x, z = ca.vertsplit(foot)
             across, up = ground.normal(x)
-            (vx, vz), (Jx, Jz) = (
-                (ca.jtimes(x, node.q, node.v), ca.jtimes(z, node.q, node.v)),
-                (ca.jacobian(x, node.q), ca.jacobian(z, node.q)),
-            )
-            found.append((x, up * vx - across * vz, up * Jx - across * Jz))
-            found.append((z - ground.height(x), across * vx + up * vz, across * Jx + up * Jz))
+            frame = ca.vertcat(ca.horzcat(up, -across), ca.horzcat(across, up))
+            rates = frame @ ca.jtimes(foot, node.q, node.v)
+            place = ca.vertcat(x, up * (z - ground.height(x)))
+            found.append((place, rates, frame @ ca.jacobian(foot, node.q)))
         places, rates, slopes = (ca.vertcat(*parts) for parts in zip(*found, strict=True))
         return places, rates, slopes
 

@@ -90,13 +90,16 @@ def contradictions(
 def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
     """Feet that would be far below the ground for long."""
     legs, log = state.physics.legs, state.batch.resampled[run]
-    heights = state.motion.places[: len(log.time), run, 1 : 2 * len(legs) : 2]
-    for leg, height in zip(legs, heights.T, strict=True):
-        if np.mean(height < -DEEP) > OFTEN:
-            at = int(np.argmin(height))
+    ground = state.physics.mechanism.scene.ground
+    feet = state.motion.places[: len(log.time), run, : 2 * len(legs)]
+    for i, leg in enumerate(legs):
+        x, distance = feet[:, 2 * i], feet[:, 2 * i + 1]
+        depth = ground.depth(x, ground.height(x) + distance / ground.normal(x)[1])
+        if np.mean(depth > DEEP) > OFTEN:
+            at = int(np.argmax(depth))
             yield KembaError(
                 log.name,
-                f"the {leg} foot would be {-1e3 * height[at]:.0f} mm below the ground "
+                f"the {leg} foot would be {1e3 * depth[at]:.0f} mm below the ground "
                 f"at {log.time[at]:.3f} s",
                 "a foot on or above it was expected",
                 f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?",

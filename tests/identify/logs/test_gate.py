@@ -46,6 +46,14 @@ def test_more_than_two_in_a_thousand_that_cannot_be_are_refused(
         check_logs([bench_log(**{name: spoilt(name, value, count)})])
 
 
+def test_a_robot_may_turn_over() -> None:
+    """A backflip's pitch is a full turn; in degrees it is refused."""
+    turn = np.linspace(0.0, -2 * np.pi, ROWS)
+    assert check_logs([bench_log(**{"body/pitch [rad]": turn})]) == []
+    with pytest.raises(BadData, match="is it in degrees"):
+        check_logs([bench_log(**{"body/pitch [rad]": np.degrees(turn)})])
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_two_in_a_thousand_are_borne(count: int) -> None:
     assert check_logs([bench_log(**{"piston/F": spoilt("piston/F", 1e4, count)})]) == []
