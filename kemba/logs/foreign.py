@@ -1,7 +1,10 @@
 """Foreign columns become ours, as a map says."""
 
+import logging
 import math
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -279,7 +282,8 @@ def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
 def _binary(path: Path) -> Recording:
     """The columns (n,) of numbers or objects of a file that may be damaged."""
     try:
-        raw = reader(path)(path)
+        with _silent():
+            raw = reader(path)(path)
     except (KembaError, MemoryError):
         raise
     except Exception as error:  # what reads the formats of others raises anything on such bytes
@@ -295,6 +299,19 @@ def _binary(path: Path) -> Recording:
             what = f"'{name}' has the shape {values.shape}"
             raise KembaError(str(path), what, f"({length},) as '{like}' was expected")
     return replace(raw, columns=columns, meta=raw.meta if isinstance(raw.meta, dict) else {})
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """No words of other packages: what they say of a file, its remarks say or its error."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(before)
 
 
 def _cells(values: Any) -> np.ndarray[Any, Any]:

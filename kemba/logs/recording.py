@@ -1,7 +1,7 @@
 """What a file of another program holds, before a map says which column is which."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -50,14 +50,19 @@ def recording(groups: Sequence[Group], remarks: Iterable[str] = ()) -> Recording
     ordered = sorted(groups, key=lambda group: -len(group.time))
     for i, group in enumerate(ordered):
         path = f"{group.name}/" if group.name and (len(groups) > 1 or "/" in group.name) else ""
-        taken = {path + name for name in group.columns}
-        clock = CLOCK if not i and CLOCK not in taken else f"{path}{OTHER_CLOCK}"
+        own = {path + name: free(path + name, columns) for name in group.columns}
+        first = not i and CLOCK not in own
+        clock = CLOCK if first else free(f"{path}{OTHER_CLOCK}", [*columns, *own.values()])
         columns[clock], units[clock] = group.time, group.time_unit
-        for name, values in group.columns.items():
-            columns[path + name] = values
-            clocks[path + name] = clock
-        units |= {path + name: unit for name, unit in group.units.items()}
+        columns |= {own[path + name]: values for name, values in group.columns.items()}
+        clocks |= dict.fromkeys(own.values(), clock)
+        units |= {own[path + name]: unit for name, unit in group.units.items()}
     return Recording(columns, {}, clocks if len(groups) > 1 else {}, units, tuple(remarks))
+
+
+def free(name: str, taken: Container[str]) -> str:
+    """The name, with a number where there is one like it already."""
+    return next(n for i in range(1, 10**6) if (n := f"{name}#{i}" if i > 1 else name) not in taken)
 
 
 def shared(groups: Iterable[Group]) -> list[Group]:
@@ -72,8 +77,9 @@ def shared(groups: Iterable[Group]) -> list[Group]:
         if other is None:
             found.append(Group("", group.time, group.time_unit, columns, units))
         else:
-            other.columns.update(columns)
-            other.units.update(units)
+            own = {name: free(name, other.columns) for name in columns}
+            other.columns.update({own[name]: values for name, values in columns.items()})
+            other.units.update({own[name]: unit for name, unit in units.items()})
     return found
 
 

@@ -44,11 +44,9 @@ def whole(ending: str) -> bytes:
         return export(short, Path(folder) / f"log.{ending}").read_bytes()
 
 
-@st.composite
-def damaged_bytes(draw: Draw) -> str:
+def damage(draw: Draw, content: bytes) -> bytes:
     """One to three kinds of damage to the bytes."""
-    ending = draw(st.sampled_from(ENDINGS))
-    found = bytearray(whole(ending))
+    found = bytearray(content)
     for kind in draw(st.lists(st.sampled_from(("cut", "flip", "zero", "repeat", "other")),
                               min_size=1, max_size=3)):  # fmt: skip
         at = draw(st.integers(0, max(len(found) - 1, 0)))
@@ -62,7 +60,14 @@ def damaged_bytes(draw: Draw) -> str:
             found[at:at] = found[at : at + draw(st.integers(1, 64))]
         elif kind == "other":
             found[at : at + 8] = draw(st.binary(min_size=8, max_size=8))
-    return as_text(ending, bytes(found))
+    return bytes(found)
+
+
+@st.composite
+def damaged_bytes(draw: Draw) -> str:
+    """Damage to the bytes of a log in any of our formats."""
+    ending = draw(st.sampled_from(ENDINGS))
+    return as_text(ending, damage(draw, whole(ending)))
 
 
 ARRAYS: tuple[Any, ...] = (

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 from kemba_cli.main import app
 
-LONGEST = {"check": 10.0, "compare": 60.0, "discover": 120.0, "solve": 10.0}  # CPU s
+LONGEST = {"check": 10.0, "map": 10.0, "compare": 60.0, "discover": 120.0, "solve": 30.0}  # CPU s
 
 
 class Hang(BaseException):

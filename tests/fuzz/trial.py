@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from fuzz import sound
 from fuzz.files import KINDS, yaml_text
 from fuzz.formats import as_file, odd_formats
+from fuzz.loggers import foreign
 from fuzz.logs import cells, damaged_log, sidecar, text
 from fuzz.rule import Outcome, outcome
 
@@ -57,6 +58,28 @@ def _format(content: str, folder: Path) -> Outcome:
     return outcome("check", as_file(content, folder))
 
 
+def _drafted(content: str, folder: Path) -> Outcome:
+    """A map is drafted of a log, and the log is read with it, be it whole or not."""
+    file, drafted = as_file(content, folder), folder / "input.map.yaml"
+    drafted.unlink(missing_ok=True)
+    found = outcome("map", file, "--out", str(drafted))
+    if found.broken or not drafted.is_file():
+        return found
+    return outcome("check", file, "--map", str(drafted))
+
+
+def _dry_run(content: str, folder: Path) -> Outcome:
+    file = folder / "input.yaml"
+    file.write_text(content, encoding="utf-8")
+    return outcome("solve", file, "--dry-run")
+
+
+def _seen(content: str, folder: Path) -> Outcome:
+    file = folder / "input.csv"
+    file.write_text(content, encoding="utf-8")
+    return outcome("compare", file, "--what-could-be-seen")
+
+
 def _bench() -> st.SearchStrategy[str]:
     return damaged_log(cells(sound.bench()))
 
@@ -72,7 +95,10 @@ TRIALS: dict[str, Trial] = {
     "bench logs": (_bench, _log("check")),
     "mapped logs": (_bench, _foreign),
     "other formats": (odd_formats, _format),
+    "foreign logs": (foreign, _drafted),
+    "dry runs": (lambda: yaml_text("tasks"), _dry_run),
     "robot logs": (_robot, _log("check")),
+    "what could be seen": (_bench, _seen),
     "compare": (_bench, _log("compare")),
     "discover": (_bench, _log("discover")),
 }

@@ -1,16 +1,12 @@
 """Formats of data loggers, simulators and middleware, written by their own libraries."""
 
-import sqlite3
-import struct
-from contextlib import closing
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from foreign_files import logs_out, robot_log
-from mcap.writer import CompressionType, Writer
+from loggers import LEGS, START, bag, columns_of, lvm, mcap_of_ros2, mdf, opensim, tdms, ulog
+from mcap.writer import Writer
 from scipy.io import savemat
 
 from kemba.errors import KembaError
@@ -19,15 +15,8 @@ from kemba.logs import ColumnMap, ColumnSource, load_map, open_log
 from kemba.logs.draft.draft import draft_map
 from kemba.logs.foreign import mapped, raw_columns
 from kemba.logs.formats.mcap import Topic
-from kemba.logs.recording import Recording
+from kemba.logs.recording import Group, Recording, recording, shared
 from kemba.trajectory import Trajectory
-
-LEGS = ("front", "rear")
-START = 1_766_147_454_000_000_000
-
-
-def columns_of(log: Trajectory) -> dict[str, np.ndarray]:
-    return {name.replace("/", "_"): log[name] for name in log.names}
 
 
 def read_back(path: Path, tmp_path: Path) -> Trajectory:
@@ -52,20 +41,8 @@ def same(back: Trajectory, log: Trajectory, atol: float = 1e-9) -> None:
 
 def test_mdf(tmp_path: Path) -> None:
     """Two groups at their own rates, units as the file states them."""
-    asammdf = pytest.importorskip("asammdf")
-    log, slow = robot_log(), slice(None, None, 10)
-    with asammdf.MDF() as file:
-        body = {n: v for n, v in columns_of(log).items() if n.startswith("body")}
-        rest = {n: v for n, v in columns_of(log).items() if n not in body}
-        for part, rows in ((body, slow), (rest, slice(None))):
-            signals = []
-            for name, values in part.items():
-                shown = np.degrees(values) if _unit(name) == "deg" else values
-                signal = asammdf.Signal(shown[rows], log.time[rows], name=name, unit=_unit(name))
-                signals.append(signal)
-            file.append(signals)
-        file.save(tmp_path / "log.mf4")
-    back = read_back(tmp_path / "log.mf4", tmp_path)
+    log = robot_log()
+    back = read_back(mdf(log, tmp_path / "log.mf4"), tmp_path)
     same(back, log, 1e-6)
     assert np.isfinite(back["body/z"]).sum() == 40 and len(back) == 400
     assert "have a clock of their own" in back.meta["read"][0]
@@ -90,136 +67,39 @@ def test_readings_that_mdf_calls_invalid_are_missing(tmp_path: Path) -> None:
     assert np.array_equal(np.isnan(back["body/z"]), bad)
 
 
-def _unit(name: str) -> str:
-    return "deg" if name.endswith(("_q", "pitch")) else "Nm" if name.endswith("tau") else ""
-
-
 @pytest.mark.parametrize("clock", ["", "Time", "Zeit [s]"])
 def test_tdms(clock: str, tmp_path: Path) -> None:
     """Waveforms with increments and offsets of their own; else a channel of times, and what is not
     as long is named."""
-    waveform = not clock
-    nptdms = pytest.importorskip("nptdms")
     log = robot_log()
-    channels = []
-    for name, values in columns_of(log).items():
-        step = 10 if waveform and name.startswith("body") else 1
-        late = 0.004 if step == 10 else 0.0
-        shown = np.interp(log.time + late, log.time, values)[::step] if step == 10 else values
-        start = np.datetime64("2026-01-01T12:00:00")
-        given = {"wf_increment": 1e-3 * step, "wf_start_offset": late, "wf_start_time": start}
-        given = given if waveform else {}
-        channels.append(nptdms.ChannelObject("log", name, shown, properties=given))
-    if not waveform:
-        channels.append(nptdms.ChannelObject("log", clock, log.time))
-        channels.append(nptdms.ChannelObject("log", "short", log.time[1:]))
-    with nptdms.TdmsWriter(tmp_path / "log.tdms") as writer:
-        writer.write_segment(channels)
-    back = read_back(tmp_path / "log.tdms", tmp_path)
+    back = read_back(tdms(log, tmp_path / "log.tdms", clock), tmp_path)
     same(back, log, 2e-4)
-    assert waveform or "not as long as" in back.meta["read"][0]
+    assert not clock or "not as long as" in back.meta["read"][0]
 
 
 def test_ulog(tmp_path: Path) -> None:
-    """Messages at their own rates; pyulog has no writer from arrays, so that the bytes are laid out
-    here as its specification says."""
+    """Messages at their own rates."""
     pytest.importorskip("pyulog")
     log = robot_log()
-    columns = columns_of(log)
-    body = {n: v for n, v in columns.items() if n.startswith("body")}
-    legs = {n: v for n, v in columns.items() if n not in body}
-    blocks = [b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 0)]
-    parts = ((0, "mocap", body, 10), (1, "legs", legs, 1))
-    for _, name, part, _ in parts:
-        fields = ";".join(["uint64_t timestamp", *(f"double {n}" for n in part)]) + ";"
-        blocks.append(_message("F", f"{name}:{fields}".encode()))
-    for number, name, _, _ in parts:
-        blocks.append(_message("A", struct.pack("<BH", 0, number) + name.encode()))
-    for row in range(len(log)):
-        for number, _, part, step in parts:
-            if row % step == 0:
-                values = [part[n][row] for n in part]
-                stamp = round(1e6 * log.time[row]) + 5_000_000
-                data = struct.pack(f"<HQ{len(values)}d", number, stamp, *values)
-                blocks.append(_message("D", data))
-    (tmp_path / "log.ulg").write_bytes(b"".join(blocks))
-    same(read_back(tmp_path / "log.ulg", tmp_path), log, 1e-6)
-
-
-def _message(kind: str, data: bytes) -> bytes:
-    return struct.pack("<HB", len(data), ord(kind)) + data
+    same(read_back(ulog(log, tmp_path / "log.ulg"), tmp_path), log, 1e-6)
 
 
 def test_lvm(tmp_path: Path) -> None:
     """LabVIEW with decimal commas and a comment behind the numbers."""
     log = robot_log()
-    columns = columns_of(log)
-    units = [{"m": "mm", "rad": "deg", "N.m": "N.m", "1": ""}[log.unit(n)] for n in log.names]
-    sizes = [{"mm": 1e3, "deg": np.degrees(1)}.get(unit, 1.0) for unit in units]
-    head = ["LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t,",
-            "***End_of_Header***", "", f"Channels\t{len(columns)}",
-            "\t".join(["Y_Unit_Label", *units]), "***End_of_Header***",
-            "\t".join(["X_Value", *columns, "Comment"])]  # fmt: skip
-    rows = []
-    for i, time in enumerate(log.time):
-        cells = [time, *(v[i] * size for v, size in zip(columns.values(), sizes, strict=True))]
-        rows.append("\t".join(f"{cell:.9g}".replace(".", ",") for cell in cells) + "\t")
-    (tmp_path / "log.lvm").write_text("\n".join([*head, *rows]) + "\n")
-    same(read_back(tmp_path / "log.lvm", tmp_path), log, 1e-6)
+    same(read_back(lvm(log, tmp_path / "log.lvm"), tmp_path), log, 1e-6)
 
 
 @pytest.mark.parametrize("ending", ["sto", "mot"])
 def test_opensim(ending: str, tmp_path: Path) -> None:
     """y is up, z to the side, angles, and these alone, in degrees by the header."""
-    t = np.arange(300) * 1e-3
-    columns = {
-        "pelvis_tx": 0.1 * t, "pelvis_ty": 0.9 + 0.1 * np.sin(9 * t), "pelvis_tz": 1e-3 * t,
-        "pelvis_tilt": np.degrees(0.1 * np.sin(8 * t)), "hip_front_q": np.degrees(np.sin(7 * t)),
-        "piston_front_length_x": 0.03 + 0.03 * np.sin(9 * t), "hip_front_torque": 5 * np.sin(t),
-        "piston_front_force": 90 * np.sin(t),
-    }  # fmt: skip
-    head = ["log", "version=1", "nRows=300", f"nColumns={len(columns) + 1}", "inDegrees=yes",
-            "endheader", "\t".join(["time", *columns])]  # fmt: skip
-    rows = ["\t".join(f"{v:.9g}" for v in row) for row in zip(t, *columns.values(), strict=True)]
-    path = tmp_path / f"log.{ending}"
-    path.write_text("\n".join([*head, *rows]))
-    draft = draft_map(path, LEGS)
+    draft = draft_map(opensim(tmp_path / f"log.{ending}"), LEGS)
     assert draft.columns["body/z [m]"]["source"] == "pelvis_ty"
     assert draft.columns["body/pitch [rad]"] == {"source": "pelvis_tilt", "unit": "deg"}
     assert draft.columns["front/hip/q [rad]"] == {"source": "hip_front_q", "unit": "deg"}
     assert draft.columns["front/piston/x [m]"] == {"source": "piston_front_length_x"}
     assert draft.columns["front/hip/tau [N.m]"] == {"source": "hip_front_torque"}
     assert draft.columns["front/piston/F [N]"] == {"source": "piston_front_force"}
-
-
-@cache
-def _store() -> Any:
-    from rosbags.typesys import Stores, get_typestore
-
-    return get_typestore(Stores.LATEST)
-
-
-def _cdr(header: float, names: list[str], position: np.ndarray, effort: np.ndarray) -> bytes:
-    store = _store()
-    stamp = round(header * 1e9)
-    time = store.types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
-    top = store.types["std_msgs/msg/Header"](time, "base")
-    joints = store.types["sensor_msgs/msg/JointState"](top, names, position, np.zeros(0), effort)
-    return bytes(store.serialize_cdr(joints, "sensor_msgs/msg/JointState"))
-
-
-def _definition() -> str:
-    store = _store()
-    return str(store.generate_msgdef("sensor_msgs/msg/JointState", ros_version=2)[0])
-
-
-JOINTS = ["front_hip", "rear_hip"]
-
-
-def joint_rows() -> list[bytes]:
-    log = robot_log()
-    both = [np.stack([log[f"{leg}/{c}"] for leg in LEGS], axis=1) for c in ("hip/q", "hip/tau")]
-    return [_cdr(t, JOINTS, q, tau) for t, q, tau in zip(log.time, *both, strict=True)]
 
 
 def check_joints(path: Path, tmp_path: Path) -> None:
@@ -237,18 +117,7 @@ def check_joints(path: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("cut", [False, True])
 def test_mcap_of_ros2(cut: bool, tmp_path: Path) -> None:
     """What rosbag2 records by default; of a file that was cut off, its whole chunks."""
-    path = tmp_path / "log.mcap"
-    with path.open("wb") as stream:
-        writer = Writer(stream, chunk_size=4096, compression=CompressionType.ZSTD)
-        writer.start(profile="ros2")
-        schema = writer.register_schema(
-            "sensor_msgs/msg/JointState", "ros2msg", _definition().encode()
-        )
-        channel = writer.register_channel("/joint_states", "cdr", schema)
-        for row, data in enumerate(joint_rows()):
-            stamp = START + row * 10**6
-            writer.add_message(channel, stamp, data, stamp)
-        writer.finish()
+    path = mcap_of_ros2(tmp_path / "log.mcap")
     if not cut:
         check_joints(path, tmp_path)
         return
@@ -265,24 +134,7 @@ def test_bags_of_ros2(folder: bool, defined: bool, tmp_path: Path) -> None:
     """SQLite files with and without definitions of their messages, alone or in their folder."""
     place = tmp_path / "bag"
     place.mkdir()
-    with closing(sqlite3.connect(place / "bag_0.db3")) as base:
-        base.execute(
-            "CREATE TABLE topics(id INTEGER, name TEXT, type TEXT, serialization_format TEXT)"
-        )
-        base.execute(
-            "CREATE TABLE messages(id INTEGER, topic_id INTEGER, timestamp INTEGER, data BLOB)"
-        )
-        kind = "sensor_msgs/msg/JointState"
-        base.execute("INSERT INTO topics VALUES (1, '/joint_states', ?, 'cdr')", (kind,))
-        if defined:
-            base.execute("CREATE TABLE message_definitions(topic_type TEXT, encoding TEXT, "
-                         "encoded_message_definition TEXT)")  # fmt: skip
-            base.execute(
-                "INSERT INTO message_definitions VALUES (?, 'ros2msg', ?)", (kind, _definition())
-            )
-        rows = [(i, 1, START + i * 10**6, data) for i, data in enumerate(joint_rows())]
-        base.executemany("INSERT INTO messages VALUES (?, ?, ?, ?)", rows)
-        base.commit()
+    bag(place / "bag_0.db3", defined)
     (place / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 5}\n")
     check_joints(place if folder else place / "bag_0.db3", tmp_path)
 
@@ -492,3 +344,45 @@ def test_a_series_of_a_start_and_an_increment(tmp_path: Path) -> None:
     found = raw_columns(tmp_path / "log.mat", None).columns
     assert found["time"] == pytest.approx(0.5 + 0.01 * np.arange(20))
     assert found["x"].tolist() == x.tolist() and found["load"].tolist() == (2 * x).tolist()
+
+
+def test_every_clock_has_a_name_of_its_own(tmp_path: Path) -> None:
+    """Three waveforms of one length and three starts; names that come again are numbered."""
+    nptdms = pytest.importorskip("nptdms")
+    path, channels = tmp_path / "log.tdms", []
+    for name, start in (("a", 0.0), ("b", 0.003), ("c", 0.007)):
+        given = {"wf_increment": 1e-3, "wf_start_offset": start, "unit_string": f"unit {name}"}
+        values = start + 1e-3 * np.arange(50)
+        channels.append(nptdms.ChannelObject("log", name, values, properties=given))
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(channels)
+    raw = raw_columns(path, None)
+    assert {name: raw.columns[raw.clocks[name]][0] for name in "abc"} == pytest.approx(
+        {"a": 0.0, "b": 0.003, "c": 0.007}
+    )
+    t, later = np.arange(3.0), 1.0 + np.arange(3.0)
+    legs = [Group("", clock, "s", {"q": clock}, {"q": "rad"}) for clock in (t, later)]
+    found = recording(legs)
+    assert found.columns["q"].tolist() == t.tolist() == found.columns["time"].tolist()
+    assert found.columns["q#2"].tolist() == later.tolist() and found.units["q#2"] == "rad"
+    assert found.columns[found.clocks["q#2"]].tolist() == later.tolist()
+    together = shared([Group("", t, "s", {"q": k * t}, {"q": f"u{k}"}) for k in (1, 2)])
+    assert together[0].columns["q#2"].tolist() == [0, 2, 4]
+    assert together[0].units == {"q": "u1", "q#2": "u2"}
+
+
+def test_a_recording_that_breaks_off_is_read_and_told(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Each channel as far as it goes, without the words of the package that reads it."""
+    whole = tdms(robot_log(), tmp_path / "log.tdms").read_bytes()
+    (tmp_path / "log.tdms").write_bytes(whole[: len(whole) // 2])
+    raw = raw_columns(tmp_path / "log.tdms", None)
+    assert raw.remarks == ("it breaks off: its channels end at different times",)
+    lengths = {len(raw.columns[name]) for name in raw.clocks}
+    assert len(lengths) == 3 and all(
+        len(raw.columns[name]) == len(raw.columns[clock]) for name, clock in raw.clocks.items()
+    )
+    (tmp_path / "log.sto").write_text("log\nendheader\ntime\tx\n")  # NumPy warns of no rows
+    assert len(raw_columns(tmp_path / "log.sto", None).columns["x"]) == 0
+    assert capfd.readouterr() == ("", "")

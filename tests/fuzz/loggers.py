@@ -1,0 +1,53 @@
+"""Logs of other programs with damage: bytes of their formats, cells of their tables."""
+
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import foreign_files
+import loggers
+from hypothesis import strategies as st
+
+from fuzz.formats import Draw, as_text, damage
+from kemba.trajectory import Trajectory
+
+ROWS = 300
+
+
+def _log() -> Trajectory:
+    return foreign_files.robot_log(ROWS)
+
+
+# of each program a file: its ending, and what writes it
+PROGRAMS: dict[str, tuple[str, Callable[[Path], Path]]] = {
+    "mdf": ("mf4", lambda path: loggers.mdf(_log(), path)),
+    "tdms": ("tdms", lambda path: loggers.tdms(_log(), path)),
+    "tdms with times": ("tdms", lambda path: loggers.tdms(_log(), path, "Time")),
+    "ulog": ("ulg", lambda path: loggers.ulog(_log(), path)),
+    "labview": ("lvm", lambda path: loggers.lvm(_log(), path)),
+    "opensim": ("sto", lambda path: loggers.opensim(path, ROWS)),
+    "bag": ("db3", lambda path: loggers.bag(path, rows=ROWS)),
+    "mcap of ros": ("mcap", lambda path: loggers.mcap_of_ros2(path, ROWS)),
+    "simulink": ("mat", lambda path: foreign_files.logs_out(_log(), path)),
+    "simulink 7.3": ("mat", lambda path: foreign_files.logs_out(_log(), path, "v7.3")),
+    "parquet": ("parquet", lambda path: foreign_files.snake(_log(), path)),
+    "german": ("csv", lambda path: foreign_files.german(_log(), path)),
+    "player": ("csv", lambda path: foreign_files.player(_log(), path)),
+    "units below": ("csv", lambda path: foreign_files.units_below(_log(), path)),
+}
+
+
+@cache
+def whole(program: str) -> bytes:
+    """A sound log of a robot as a program writes it."""
+    ending, write = PROGRAMS[program]
+    with tempfile.TemporaryDirectory() as folder:
+        return write(Path(folder) / f"log.{ending}").read_bytes()
+
+
+@st.composite
+def foreign(draw: Draw) -> str:
+    """One to three kinds of damage to the bytes of a log of another program."""
+    program = draw(st.sampled_from(tuple(PROGRAMS)))
+    return as_text(PROGRAMS[program][0], damage(draw, whole(program)))
