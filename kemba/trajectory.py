@@ -244,23 +244,23 @@ class Trajectory:
         return Trajectory(self.time, columns, self.meta)
 
     def with_columns(self, columns: Mapping[str, Any]) -> Trajectory:
-        """The same with columns, given by header, added or replaced."""
+        """The same with `columns` (n,), given by header, added or replaced."""
         replaced = {Quantity.from_header(header).name for header in columns}
         kept = self.select(name for name in self.names if name not in replaced)
         return Trajectory(self.time, {**kept.columns, **columns}, self.meta)
 
     def rows(self, chosen: Any) -> Trajectory:
-        """The rows that an index, a slice or a mask (n,) chooses."""
+        """The rows `chosen` by an index, a slice or a mask (n,)."""
         columns = {header: values[chosen] for header, values in self.columns.items()}
         return Trajectory(self.time[chosen], columns, self.meta)
 
     def at_times(self, time: Array) -> Trajectory:
-        """The same columns at other times (n,) [s]."""
+        """The same columns at other times, `time` (n,) [s]."""
         return Trajectory(time, self.columns, self.meta)
 
     def held(self, name: str, times: Array) -> Array:
-        """A column at `times` of any shape [s], where each row holds until the next and the first
-        holds before."""
+        """Column `name` at `times` of any shape [s]: each row holds until the next, and the first
+        before it."""
         row = np.searchsorted(self.time, times + SAME_TIME, side="right") - 1
         return np.asarray(self[name][np.maximum(row, 0)])
 
@@ -279,7 +279,7 @@ class Trajectory:
         return Trajectory(times, columns, self.meta)
 
     def write(self, path: str | Path) -> None:
-        """Write the CSV, and the sidecar when there is metadata; reading it back is exact.
+        """Write a CSV to `path`, and the sidecar when there is metadata; reading it back is exact.
 
         Raises KembaError when the times are not strictly increasing.
         """
@@ -293,7 +293,7 @@ class Trajectory:
 
     @classmethod
     def read(cls, path: str | Path, strict: bool = True) -> Trajectory:
-        """The trajectory in a CSV file, with its sidecar.
+        """The trajectory in the CSV at `path`, with its sidecar.
 
         `strict=False` lets through no rows and times that do not increase, for readers who judge
         the data themselves. Raises KembaError with file:row:column of the first fault.

@@ -95,7 +95,7 @@ def compare(
     run: str | Path | None = None,
     progress: Tell | None = None,
 ) -> Compared:
-    """Where `model` fails on logs of one machine, as `kemba-opt compare` says it.
+    """Where `model` fails on `logs` of one machine, as `kemba-opt compare` says it.
 
     `columns`: the file of a column map; `run`: the run that was executed. `progress`: as of
     `kemba.plan`. Raises KembaError.
@@ -117,8 +117,9 @@ def discover(
 ) -> Discovered:
     """Which physical effect `model` lacks, as `kemba-opt discover` answers it.
 
-    `out`: folder for answer.json and model.yaml; nothing is written without it. `time_limit` in
-    s. Raises KembaError for files that cannot be read.
+    `logs`: of one machine; `holdout`: logs kept for judging. `out`: folder for answer.json and
+    model.yaml; nothing is written without it. `time_limit` in s. `columns`, `progress`: as of
+    `compare`. Raises KembaError for files that cannot be read.
     """
     from kemba.identify.workflow import discover_logs
 
@@ -187,10 +188,11 @@ def learn(
     progress: Tell | None = None,
     **changes: Any,
 ) -> Learned:
-    """Learn from executed runs and plan the next one, as `kemba-opt learn` does.
+    """Learn from executed `runs` and plan the next one, as `kemba-opt learn` does.
 
-    `target`: the task to plan, that of the last run by default; `changes` are those of `--set`;
-    `out`: its run folder. `time_limit` in s. Raises KembaError.
+    `logs`, `holdout`, `columns`, `progress`: as of `discover`. `target`: the task to plan, that of
+    the last run by default; `changes` are those of `--set`; `out`: its run folder. `correct`: plan
+    by what executions did beyond the learnt model too. `time_limit` in s. Raises KembaError.
     """
     from kemba.rounds.round import Asked, learn_into
     from kemba.runs import load_run

@@ -78,7 +78,7 @@ Path_ = str | Path
 
 
 def load_task(name: Path_, **changes: Any) -> Task:
-    """A task: a path or a shipped name such as `jump.yaml`.
+    """A task; `name`: a path or a shipped name such as `jump.yaml`.
 
     `changes` are those of `--set`: `height="0.6 m"`; keys with points go in as
     `**{"goals.apex": "0.6 m"}`. Raises KembaError with every mistake at its line.
@@ -87,12 +87,12 @@ def load_task(name: Path_, **changes: Any) -> Task:
 
 
 def load_model(name: Path_ = "planning", supply: float | None = None) -> Model:
-    """A model: a path or a shipped name. `supply` in Pa. Raises KembaError."""
+    """A model; `name`: a path or a shipped name. `supply` in Pa. Raises KembaError."""
     return load(name, supply=supply)
 
 
 def load_log(path: Path_, columns: ColumnMap | Path_ | None = None) -> Trajectory:
-    """A log of any format that `docs/logs.md` lists; `columns` is a column map or its file.
+    """The log at `path`, of any format of `docs/logs.md`; `columns` is a column map or its file.
 
     Raises KembaError with row and column of the first fault.
     """
@@ -114,7 +114,7 @@ class Planned(Result):
 
     @classmethod
     def read(cls, path: str | Path) -> Planned:
-        """The plan of an earlier run. Raises KembaError where it has no certificate."""
+        """The plan of the run at `path`. Raises KembaError where it has no certificate."""
         return cls(Path(path), read_json(Path(path) / "certificate.json"))
 
     @property
@@ -164,8 +164,9 @@ def plan(
     """Plan a motion and certify it, as `kemba-opt solve` does.
 
     `task`: a path, a shipped name, or a loaded task; `out`: its run folder, `runs/TASK-N` without.
-    `changes` are those of `--set`: `height` is that of the body's centre (at 0.45 m the feet rise
-    1 cm), `feet` that of the feet. `cold`: begin from a guess, also where an
+    `model`: instead of the task's. `changes` are those of `--set`: `height` is that of the body's
+    centre (at 0.45 m the feet rise 1 cm), `feet` that of the feet. `starts`: guesses to try, the
+    best plan is kept. `replay`: execute it in simulation. `cold`: begin from a guess, also where an
     earlier plan of yours is near; `memory`: whether such plans are looked up, and this one listed.
     `progress` gets the name of every stage; by default notebooks and terminals show them. Raises
     KembaError for mistakes; a task that cannot be met is none, the certificate says why.
@@ -239,11 +240,12 @@ def simulate(
     force: bool = False,
     progress: Tell | None = None,
 ) -> Executions:
-    """Execute a run's controller on the plant and write logs, as `kemba-opt simulate` does.
+    """Execute the controller of `run` on the plant and write logs, as `kemba-opt simulate` does.
 
-    `out`: folder for the logs, a new one in the run without it. The same `seed` gives the same
-    logs. `progress`: as of `plan`. Raises KembaError where the run has no
-    controller table.
+    `out`: folder for the logs, a new one in the run without it; `force`: replace logs there.
+    `plant`: a model, that of the task without it. `repeat`: how often; `noise` of sensors and
+    valves, the same for the same `seed`. `progress`: as of `plan`. Raises KembaError where the run
+    has no controller table.
     """
     path = run.path if isinstance(run, Planned) else Path(run)
     default = (path if path.is_dir() else path.parent) / "logs"

@@ -46,7 +46,7 @@ def find_effect(name: str) -> type[Effect]:
 
 
 def describe(effect: type[Effect]) -> dict[str, Any]:
-    """Name, equation, parameters with units and sizes, and source, as plain data."""
+    """Name, equation, parameters with units and sizes, and source of an `effect`, as data."""
     places = effect.place if isinstance(effect.place, str) else "the port it names"
     ports = effect.ports if isinstance(effect.ports, tuple) else ()
     return {

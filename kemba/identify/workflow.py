@@ -249,7 +249,8 @@ def admitted(logs: Sequence[Trajectory], model: Model) -> tuple[Problem, list[st
 def check_log(
     path: str | Path, model: str = "planning", column_map: str | Path | None = None
 ) -> tuple[Trajectory, list[str]]:
-    """A log that `compare` and `discover` will accept, and remarks on it.
+    """The log at `path`, which `compare` and `discover` will accept, and remarks on it; `model`: of
+    its machine; `column_map`: for the log of another program.
 
     Raises KembaError where the file cannot be read; BadData where the log cannot be right.
     """

@@ -81,7 +81,8 @@ class Mechanism:
 
         Unless that is level at 0 and free, it has ports for the height of feet, knees and hips
         above the ground under them (`front/foot/gap`), and above its obstacles (`front/foot/room`).
-        It has a mirror where every place of the scene is like every other.
+        It has a mirror where every place of the scene is like every other. Raises ValueError where
+        it stands in a scene already.
         """
         if (scene, at) == (self.scene, self.coordinates[0].value) or self.robot is None:
             return self

@@ -293,8 +293,8 @@ class Characteristics:
 def characterise(
     logs: dict[str, Trajectory], cylinder: Cylinder, supplies: Sequence[float] = ()
 ) -> Characteristics:
-    """Fit eq. 4 to 7 to bench logs by name, of a cylinder of these dimensions; `supplies` [Pa] of
-    logs that do not tell theirs. Raises KembaError when they hold nothing to fit."""
+    """Fit eq. 4 to 7 to bench `logs` by name, of a `cylinder` of these dimensions; `supplies` [Pa]
+    of logs that do not tell theirs. Raises KembaError when they hold nothing to fit."""
     for name, log in logs.items():
         for column in ("piston/x", "piston/F", "valve/extend", "valve/retract"):
             if column not in log:

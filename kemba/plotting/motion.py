@@ -268,7 +268,8 @@ def plot_force_velocity(
 def draw(
     sources: Sequence[Source], model: str | None = None, figure: Figure | None = None
 ) -> Figure:
-    """All sources over each other; `model` as in `machine_of`, for the first of them.
+    """All `sources` over each other; `model` as in `machine_of`, for the first of them; `figure`:
+    where they are drawn, a new one without it.
 
     Raises KembaError when bench and robot logs are mixed, or have nothing to plot.
     """

@@ -101,7 +101,7 @@ def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
 
 
 def load_sources(paths: Iterable[str | Path], columns: ColumnMap | None = None) -> list[Source]:
-    """Several of them, with names that differ."""
+    """The runs and logs at `paths`, with names that differ; `columns`: a map for these logs."""
     sources = [load_source(path, columns) for path in paths]
     counts = Counter(source.name for source in sources)
     return [

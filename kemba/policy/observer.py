@@ -42,7 +42,7 @@ class Observer:
 
 
 def observer_of(course: EventCourse, rows: Array, first: int) -> Observer:
-    """The filter of a table whose ticks from `first` on are the `rows` of the course."""
+    """The filter of a table whose ticks from `first` on are the `rows` (k,) of the course."""
     n, m, ticks = course.hybrid.size, len(course.joints), len(rows)
     A, B = np.tile(np.eye(n), (ticks, 1, 1)), np.zeros((ticks, n, m))
     late: dict[tuple[str, int], tuple[int, Array]] = {}

@@ -151,7 +151,7 @@ def write_policy(model: Model, table: Trajectory, path: str | Path) -> Path:
 
 
 def policy_arrays(course: EventCourse) -> dict[str, Array]:
-    """The arrays of a policy by name, as docs/policy.md lists them."""
+    """The arrays of a policy by name, as docs/policy.md lists them with their shapes (n, k)."""
     model = course.hybrid.model
     table, motion = read_controller(course.table), course.motion
     ticks, first = len(table), round(table.time[0] / PERIOD)

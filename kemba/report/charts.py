@@ -185,7 +185,7 @@ def colour(tracks: Sequence[Track], index: int) -> str:
 
 
 def in_words(chart: Chart, grid: Array, tracks: Sequence[Track]) -> str:
-    """What a chart shows as one text."""
+    """What a chart shows of tracks on a `grid` (n,) as one text."""
     parts = []
     for line in chart.lines:
         known = np.isfinite(line.values)
@@ -231,7 +231,7 @@ def _rounded(spans: Spans) -> list[list[float]]:
 
 
 def numbers(values: Array) -> list[float | None]:
-    """Numbers with five digits for JSON; null where there is none."""
+    """Numbers (n,) with five digits for JSON; null where there is none."""
     return [float(f"{v:.5g}") if np.isfinite(v) else None for v in values]
 
 

@@ -16,7 +16,7 @@ FORMATS = ("csv", *MODULES)
 
 
 def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None = None) -> Path:
-    """Write a trajectory in the format of the ending of `path`; the path.
+    """Write the `trajectory` in the format of the ending of `path`; the path.
 
     .csv: the log format, or with `columns` what another program reads through that map backwards.
     .mcap: one topic per part, for PlotJuggler and Foxglove. .parquet and .json: columns by header.

@@ -54,7 +54,7 @@ def use_of(track: Track, model: Model, machine: Machine, leg: str) -> Use:
 
 
 def motor_share(motor: Motor, torque: Array, speed: Array) -> Array:
-    """Torque as a share of what the motor gives at this speed: its peak, less at high speed."""
+    """Torque (n,) [N.m] over what the motor gives at this speed: its peak, less at high speed."""
     slope = (motor.w_noload - motor.w_rated) / motor.tau_rated
     driving = np.clip(speed * np.sign(torque), 0.0, None)
     left = np.clip((motor.w_noload - driving) / slope, 1e-3, motor.tau_peak)

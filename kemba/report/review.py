@@ -255,9 +255,10 @@ def review(
 
     Without `force` a page that is there already is kept, and a new one is numbered.
 
-    `run`, `answer`: folders of solve and discover. `model`: what the logs are compared with, by
-    default that of the run's task. The page needs no other file. Raises KembaError where a file
-    cannot be read or written, or nothing is given.
+    `run`, `answer`: folders of solve and discover. `column_map`: of `logs` of other programs.
+    `model`: what the logs are compared with, by default that of the run's task. `tell` gets what is
+    being done. The page needs no other file. Raises KembaError where a file cannot be read or
+    written, or nothing is given.
     """
     given = gather_material(logs, run, answer, model, column_map, tell)
     tell("drawing")
@@ -273,7 +274,8 @@ def review(
 def report_run(
     run: str | Path, out: str | Path | None = None, force: bool = False
 ) -> tuple[Path, ReviewVerdict]:
-    """The page of a run alone, by default a new `report.html` in it. Raises KembaError."""
+    """The page of `run` alone: `out`, by default a new `report.html` in it, which `force` replaces.
+    Raises KembaError."""
     folder = load_run(run).path
     path = place_for(out, folder / "report.html", force)
     return review(run=folder, out=path, force=True)
@@ -298,7 +300,7 @@ def gather_material(
     column_map: str | Path | None,
     tell: Tell = silent,
 ) -> Material:
-    """Read everything; the comparison of the logs included."""
+    """Read everything; the comparison of the logs included. Raises KembaError."""
     if not logs and run is None and answer is None:
         raise KembaError("", "nothing to review", "logs, --run or --answer was expected")
     found = load_run(run) if run is not None else None

@@ -34,11 +34,12 @@ def view_run(
     column_map: str | Path | None = None,
     plan: str | Path | None = None,
 ) -> Path:
-    """A page with the motion of a run folder or a log in 3-D, which needs no other file; written
-    to `out` or as a new file beside the motion.
+    """A page with the motion of `run`, a run folder or a log, in 3-D, which needs no other file;
+    written to `out`, which `force` replaces, or as a new file beside the motion.
 
-    `column_map`: for the log of another program. `plan`: the run that is drawn as a ghost. Raises
-    KembaError where columns are missing or the page cannot be written.
+    `model`: of the robot that is drawn. `column_map`: for the log of another program. `plan`: the
+    run that is drawn as a ghost. Raises KembaError where columns are missing or the page cannot be
+    written.
     """
     source, ghost = shown(run, column_map, plan)
     assert source.path is not None

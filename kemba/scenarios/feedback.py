@@ -74,7 +74,7 @@ def words_of(file: Path) -> str:
 
 
 def acting(arrays: Mapping[str, Array], edges: bool, hips: bool) -> dict[str, Array]:
-    """The arrays of a policy of which only these parts act; the others' gains are zero."""
+    """The arrays (n, ...) of a policy of which only these parts act; the others' gains are zero."""
     kept = {"edge_gain": arrays["edge_gain"] * edges, "hip_gains": arrays["hip_gains"] * hips}
     return {**arrays, **kept}
 

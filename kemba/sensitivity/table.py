@@ -153,7 +153,8 @@ def _text(number: float | None) -> str:
 def sensitivity_of_run(
     run: str | Path, tell: Callable[[str], None] = lambda text: None, only: Sequence[str] = ()
 ) -> Sensitivity:
-    """What small changes do to the plan of a run folder; `only`: the names of wanted figures.
+    """What small changes do to the plan of the folder `run`; `only`: the names of wanted figures;
+    `tell` gets what is being done.
 
     Raises KembaError where the folder is no run, has no plan, or its model is gone, and where there
     is no such figure.

@@ -148,7 +148,8 @@ HOW = {"name", "notes", "guess", "guess_noise", "seed", "method", "solver", "tol
 
 
 def expand(sweep: Sweep, document: Document, folder: Path) -> list[Case]:
-    """All cases of a sweep. Raises ConfigErrors with the mistakes of all blocks.
+    """All cases of a `sweep`, which `document` tells the places of. Raises KembaError: ConfigErrors
+    with the mistakes of all blocks.
 
     `folder` keeps the plans that are to be executed; they are made here when missing.
     """

@@ -38,7 +38,8 @@ def run_cases(
     time_limit: float | None = None,
     tell: Tell = lambda case, record: None,
 ) -> dict[str, Record]:
-    """Run the cases without a result; `tell` is called after each. Returns records by key.
+    """Run those of the `cases` that have no result in `folder`, `jobs` at the same time; `tell` is
+    called after each. Returns records by key.
 
     Cases that `time_limit` [s] cut off are missing from the answer. A case whose workers die
     repeatedly is an error in the answer, but not in the folder, so the next run tries it again.

@@ -412,10 +412,10 @@ def propose(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> RigDesign:
-    """The test of a rig that best tells the possible effects of an answer apart, a YAML in `out`.
+    """The test of a rig that best tells the possible effects of an answer in `folder` apart, a YAML
+    in `out`. `bounded`: in about a minute. `say` gets what is being done.
 
-    `bounded`: in about a minute. Raises KembaError where no test shows a difference, or a file
-    cannot be read or written.
+    Raises KembaError where no test shows a difference, or a file cannot be read or written.
     """
     answer = read_answer(folder)
     rivals = contenders(answer)

@@ -18,7 +18,7 @@ class DriftSettings:
 def with_learnt_colour(
     problem: Problem, theta: Theta, blocks: Labels | None = None, careful: bool = False
 ) -> Problem:
-    """The problem under the noise colour of a flexible model's residual about `theta`.
+    """The problem under the noise colour of a flexible model's residual (n,) about `theta`.
 
     A residual of the model under test would not do: a missing effect would pass for coloured
     noise. `careful`: the model at theta is good; see `Problem.recolour`.

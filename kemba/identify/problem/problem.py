@@ -36,12 +36,12 @@ ABSURD = 1e5  # residual in sigmas at which nothing can be predicted: beyond dat
 
 
 def bounded(residual: Array, absurd: float) -> Array:
-    """Residuals held within `absurd` sigmas; those that are no numbers are as large as that."""
+    """Residuals (n,) within `absurd` sigmas; those that are no numbers are as large as that."""
     return np.asarray(np.clip(np.nan_to_num(residual, nan=absurd), -absurd, absurd))
 
 
 def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:
-    """Mean slope, shaped as the residuals `base`, of finite `steps` that lead to the residuals
+    """Mean slope (n,) of residuals `base` (n,) over finite `steps` that lead to the residuals
     `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
     through its cylinder's end leaves no volume to the air."""
     known = [i for i, r in enumerate(there) if np.all(np.abs(r) < ABSURD)]
@@ -241,7 +241,7 @@ class Problem(ABC):
 
     def rebuilt(self, theta: Theta) -> Self:
         """The same logs under the model with the structure that theta has switched on; its
-        figures are nuisance parameters about their usual values."""
+        figures are nuisance parameters about their usual values. Raises NotImplementedError."""
         raise NotImplementedError("these logs have no other structure")
 
     # Where each row was taken, and which forces may be missing

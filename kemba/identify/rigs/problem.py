@@ -307,7 +307,7 @@ class RigProblem(ColouredProblem):
     def missing_force(
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
-        """The force that is missing, per run."""
+        """The force (n,) [N] that is missing, per run."""
         return [
             missing_along(
                 log.name,

@@ -159,7 +159,8 @@ class RobotProblem(Problem):
         return found
 
     def recolour(self, residual: Array | None, careful: bool = False) -> Self:
-        """The same problem with the colour of each sensor's noise learnt anew, or as stated."""
+        """The same problem with the colour of each sensor's noise as stated, or learnt anew from a
+        residual (n,)."""
         if residual is None:
             return self._with_noise(stated_noise(self.batch))
         return self._with_noise(learnt_from(self.state, residual, drifts=careful))

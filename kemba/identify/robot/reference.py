@@ -94,7 +94,7 @@ def integrator(h: Array, k: int, extra: int) -> tuple[Array, Array]:
 
 
 def first_reference(physics: Physics, batch: Batch, p: Array) -> Reference:
-    """Every coordinate smoothed on its own; of the model only its lengths count, at `p`."""
+    """Every coordinate smoothed on its own; of the model only its lengths count, at `p` (k,)."""
     k, legs = physics.mechanism.n, len(physics.legs)
     y = batch.flat(batch.y)
     pistons = y[:, -legs:]

@@ -77,7 +77,7 @@ def switches(raw: Raw) -> set[str]:
 
 
 def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | None:
-    """The best of all candidates; None where no column rises that may be a time.
+    """The best of all candidates (n,); None where no column rises that may be a time.
 
     A question is put where another one, as good by its name, runs at another rate.
     """

@@ -178,8 +178,8 @@ def draft_map(
     rig: str = "",
     logged: Mapping[str, str] | None = None,
 ) -> Draft:
-    """A map for the log `path` of a robot with these legs and pistons of this `stroke` [m], or of a
-    `rig` of this kind whose logs must have the columns `logged` (units by name).
+    """A map for the log `path` of a robot with these `legs` and pistons of this `stroke` [m], or of
+    a `rig` of this kind whose logs must have the columns `logged` (units by name).
 
     Raises KembaError where the file is no table or has no time.
     """

@@ -181,7 +181,7 @@ class Assigned:
 
 
 def assigned(names: Names, values: Mapping[str, Array], targets: Sequence[Target]) -> Assigned:
-    """The assignment of the largest sum of scores; each column is used once.
+    """The assignment of the largest sum of scores; each column (n,) is used once.
 
     Columns with a unit of another dimension are no candidates. A target whose best column can be
     exchanged for another, of other values, at no cost is a tie, and is not assigned.

@@ -41,8 +41,8 @@ Size = tuple[float, float, float]
 def guessed_units(
     names: Names, pairs: Mapping[str, str], values: Mapping[str, Array], stroke: float | None
 ) -> tuple[dict[str, str], list[str]]:
-    """The units of our headers whose foreign columns (`pairs`) have none, and what is to be asked
-    about them.
+    """The units of our headers whose foreign columns (`pairs`, (n,) in `values`) have none, and
+    what is to be asked about them; `stroke` [m].
 
     Columns of one kind (all hips) are told by their size together. Those whose size tells nothing
     have our unit, or the one that was told for others without a unit; where another unit that the

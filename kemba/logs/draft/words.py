@@ -254,8 +254,8 @@ UNIT_NORM = 0.02
 def quaternions(
     values: Mapping[str, Array], names: Names
 ) -> tuple[dict[str, Array], Names, dict[str, tuple[str, ...]]]:
-    """The columns without those of quaternions, each with the pitch that it turns by instead, and
-    the four columns x, y, z, w of each pitch. Four that are numbered are one only where the first
+    """The columns (n,) without those of quaternions, instead of each the pitch that it is, and the
+    four columns x, y, z, w of each pitch. Four that are numbered are one only where the first
     is the larger of the outer two: else w may be the last."""
     found: dict[str, dict[str, str]] = {}
     numbered = set()
@@ -290,7 +290,7 @@ def quaternions(
 
 
 def upright(values: Mapping[str, Array], names: Names) -> tuple[Names, list[str]]:
-    """Which of y and z is up: z, unless it stays about zero while y does not."""
+    """Which of the columns (n,) y and z is up: z, unless it stays about zero while y does not."""
     heights: dict[str, list[float]] = {}
     for name, y in values.items():
         says = names.says(name)

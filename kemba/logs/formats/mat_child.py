@@ -190,7 +190,8 @@ def uniform(info: dict[str, Any], data: Any) -> np.ndarray | None:
 
 
 def content(path: str) -> dict[str, Any]:
-    """The variables of a file: by SciPy, or by mat-io with objects or in version 7.3."""
+    """The variables of a file: by SciPy, or by mat-io with objects or in version 7.3. Raises
+    SystemExit without mat-io."""
     with open(path, "rb") as stream:
         head = stream.read(520)
     if HDF5 not in (head[:8], head[512:]):
@@ -213,6 +214,7 @@ def limit_memory() -> None:
 
 
 def walked(variables: dict[str, Any]) -> Found:
+    """All series and loose arrays in the variables of a file."""
     found = Found()
     own = {name: value for name, value in variables.items() if not str(name).startswith("__")}
     for name, value in own.items():
@@ -223,6 +225,7 @@ def walked(variables: dict[str, Any]) -> Found:
 
 
 def main() -> int:
+    """Write the arrays of the file argv[1] to argv[2]; 1 where it cannot be read."""
     limit_memory()
     try:
         found = walked(content(sys.argv[1]))

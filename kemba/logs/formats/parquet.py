@@ -28,7 +28,8 @@ def write_parquet(trajectory: Trajectory, path: Path) -> None:
 
 
 def read_parquet(path: Path) -> Recording:
-    """The columns, numbers as floats, times as whole ns, anything else as texts; the metadata."""
+    """The columns, numbers as floats, times as whole ns, anything else as texts; the metadata.
+    Raises KembaError for damaged files."""
     try:
         with pq.ParquetFile(path) as file:
             found = file.metadata

@@ -167,7 +167,7 @@ class Solves:
         return self._solve(f"relaxed by {sigma:.0e}", self.program.relaxed(sigma), start, options)
 
     def branch(self, first: np.ndarray, start: Iterate, sigma: float) -> Iterate:
-        """The program in which one side of every pair is zero, from a point relaxed by `sigma`."""
+        """The program in which G, where `first` (pairs,), or H is zero, from a relaxed point."""
         push = min(OFF, sigma)
         options = {"tol": 1e-8, "max_iter": BRANCH, **warm(min(sigma, 1e-4), push)}
         return self._solve("branch", self.program.branch(first), start, options)

@@ -277,7 +277,7 @@ class Task(Section):
         return isinstance(other, Task) and self.__dict__ == other.__dict__
 
     def place(self, key: str) -> str:
-        """Where the file asks for a key of `PLACED`, `jump.yaml:9`; empty where it does not."""
+        """Where the file asks for a `key` of `PLACED`, `jump.yaml:9`; empty where it does not."""
         return self._places.get(key, "")
 
     @property
