@@ -4,6 +4,7 @@ Never needed: where the list, an entry or a run folder is gone or damaged, plans
 """
 
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -64,7 +65,7 @@ def recalled(task: Task, model: Model, tell: Tell) -> Origin | None:
             break
         try:
             origin = origin_of(one.run)
-        except KembaError:  # moved, changed or removed since
+        except (KembaError, OSError, ValueError):  # moved, changed or removed since, or no name
             continue
         hint = "one from a guess (--no-memory) may take less"
         return replace(
@@ -117,9 +118,20 @@ def _listed(file: Path, tell: Tell) -> Iterator[Remembered]:
         try:
             entry = json.loads(line)
             figures = {str(key): float(value) for key, value in entry["figures"].items()}
-            yield Remembered(str(entry["kind"]), figures, float(entry["cost"]), str(entry["run"]))
-        except (ValueError, KeyError, TypeError, AttributeError):
-            damaged += 1
+            one = Remembered(str(entry["kind"]), figures, float(entry["cost"]), str(entry["run"]))
+            good = all(map(math.isfinite, (one.cost, *figures.values())))
+        except (
+            ArithmeticError,
+            AttributeError,
+            LookupError,
+            RecursionError,
+            TypeError,
+            ValueError,
+        ):
+            good = False
+        if good:
+            yield one
+        damaged += not good
     if damaged:
         tell(f"{damaged} entries of {file} cannot be read and are left out")
 

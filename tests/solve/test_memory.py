@@ -1,6 +1,7 @@
 """Plans that the user has made start further ones; nothing depends on them."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,32 @@ def test_damaged_entries_and_runs_that_are_gone_are_left_out(tmp_path: Path, lis
     listed.write_bytes(b"\xff")
     assert recalled(task, model, told.append) is None
     assert "cannot be read and is left out" in told[-1]
+
+
+ODD = {
+    "cost": [None, "x", [], math.nan, -math.inf, 10**400],
+    "figures": [None, [], {"height": math.inf}, {"height": 10**400}, {"height": {}}],
+    "run": ["a" * 10**4, "\0", "/dev/null", "../..", 10**400],
+}
+
+
+def test_entries_of_others_are_data(tmp_path: Path, listed: Path) -> None:
+    """Whatever stands in them, plans begin from guesses, no cost is believed that is no number, and
+    what cannot be read is said."""
+    task, _ = load_task("hop.yaml")
+    model = task_model(task)
+    entry = {"kind": kind_of(task, model), "figures": figures_of(task, model), "cost": 0.5}
+    entry["run"] = str(tmp_path / "gone")
+    for key, values in ODD.items():
+        for value in values:
+            told: list[str] = []
+            listed.write_text(json.dumps({**entry, key: value}) + "\n" + "[" * 10**5 + "\n")
+            assert recalled(task, model, told.append) is None
+            known = best_known(task, model, told.append)
+            assert known == ({"cost": 0.5, "of": 1} if key == "run" else None), (key, str(value))
+            count = 1 if key == "run" else 2
+            said = f"{count} entries of {listed} cannot be read and are left out"
+            assert told == [said, said], (key, str(value))
 
 
 def test_without_a_folder_nothing_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
