@@ -19,8 +19,9 @@ def test_milliseconds_without_zeros_before_them_are_a_count(mark: str) -> None:
     texts = [f"12:00:{count // 1000:02d}{mark}{count % 1000}" for count in ms]
     read = seconds(np.array(texts, dtype=object))
     assert read == pytest.approx((ms - ms[0]) / 1000)
-    short = seconds(np.array(["12:00:01.25", "12:00:01.5", "12:00:01.75"], dtype=object))
-    assert short == pytest.approx([0.0, 0.25, 0.5])
+    for texts in (["1.25", "1.5", "1.75"], ["0.75", "1.0", "1.25"], ["1.5", "1.75", "2"]):
+        short = seconds(np.array([f"12:00:0{text}" for text in texts], dtype=object))
+        assert short == pytest.approx([0.0, 0.25, 0.5]), "goes on as a count, too"
 
 
 @pytest.mark.parametrize(("gap", "known"), [(24e-3, True), (26e-3, False)])
