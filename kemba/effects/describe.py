@@ -67,9 +67,10 @@ def describe(effect: type[Effect]) -> dict[str, Any]:
 def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
     param = effect.declared()[name]
     off = effect.off.get(name)
+    unit = f"{param.unit} or {param.rotary}" if param.rotary else param.unit
     return {
         "name": name,
-        "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else _unit(param),
+        "unit": "channel's" if name in getattr(effect, "in_channel_unit", ()) else unit,
         "size": param.size,
         "default": _usual(effect, effect.model_fields[name].default),
         "off": "infinity" if off is not None and math.isinf(off) else off,
@@ -77,10 +78,6 @@ def _parameter(effect: type[Effect], name: str) -> dict[str, Any]:
         "upper": param.upper if math.isfinite(param.upper) else None,
         "doc": param.doc,
     }
-
-
-def _unit(param: Param) -> str:
-    return f"{param.unit} or {param.rotary}" if param.rotary else param.unit
 
 
 def _tables(effect: type[Effect]) -> Iterator[dict[str, Any]]:

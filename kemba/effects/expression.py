@@ -46,13 +46,9 @@ class Constant(NamedTuple):
         return number if self.unit == "1" else f"{number} {self.unit}"
 
 
-def _constant(value: Any) -> Constant:
-    return value if isinstance(value, Constant) else Constant(*read_si(value))
-
-
 Number = Annotated[
     Constant,
-    PlainValidator(_constant),
+    PlainValidator(lambda v: v if isinstance(v, Constant) else Constant(*read_si(v))),
     PlainSerializer(str),
     WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
 ]

@@ -136,9 +136,12 @@ def strangers(run: Run, logs: Sequence[Trajectory]) -> list[Stranger]:
     if not (run.path / "controller.csv").is_file():
         return []
     found = []
+    late = (
+        1e-3 * LATEST if (run.path / POLICY).is_file() else 0.0
+    )  # s: feedback may move an edge so
     for log in logs:
         name, made_of = str(log.meta.get("name", "the log")), str(log.meta.get("repeat_of", ""))
-        share = other_commands(log, run.controller, _moved(run))
+        share = other_commands(log, run.controller, late)
         why = _reason(log, run, made_of, share)
         if why:
             found.append(Stranger(name, why, made_of, share or 0.0))
@@ -209,11 +212,6 @@ def _sentence(alike: Sequence[Stranger], run: Run) -> str:
 
 def _legs(table: Trajectory) -> tuple[str, ...]:
     return tuple(sorted(n.split("/")[0] for n in table.names if n.endswith("/hip/q")))
-
-
-def _moved(run: Run) -> float:
-    """By how much [s] the run's feedback may move an edge."""
-    return 1e-3 * LATEST if (run.path / POLICY).is_file() else 0.0
 
 
 PLANNING = "planning"

@@ -143,11 +143,8 @@ def _cells(figure: FigureStep, executed: Shift | None, new: Replanned | None) ->
     lands = float(e.lands) if executed else None
     numbers = [figure.value, figure.step, e.apex, e.touchdown, e.end_x, e.end_z, lands]
     numbers += [r.cost, r.duration, r.touchdown, r.apex]
-    return [figure.name, figure.unit, *map(_text, numbers)]
-
-
-def _text(number: float | None) -> str:
-    return "" if number is None or number != number else f"{number:.6g}"
+    texts = ("" if n is None or n != n else f"{n:.6g}" for n in numbers)
+    return [figure.name, figure.unit, *texts]
 
 
 def sensitivity_of_run(

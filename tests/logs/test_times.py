@@ -22,6 +22,8 @@ def test_milliseconds_without_zeros_before_them_are_a_count(mark: str) -> None:
     for texts in (["1.25", "1.5", "1.75"], ["0.75", "1.0", "1.25"], ["1.5", "1.75", "2"]):
         short = seconds(np.array([f"12:00:0{text}" for text in texts], dtype=object))
         assert short == pytest.approx([0.0, 0.25, 0.5]), "goes on as a count, too"
+    back = seconds(np.array(["12:00:01.5", "12:00:01.12", "12:00:01.05"], dtype=object))
+    assert back == pytest.approx([0.0, -0.38, -0.45]), "as written where it goes back either way"
 
 
 @pytest.mark.parametrize(("gap", "known"), [(24e-3, True), (26e-3, False)])

@@ -51,5 +51,12 @@ def test_a_place_or_a_remark_in_brackets_is_no_unit(text: str) -> None:
     assert named_unit(f"hip [{text}]")[1] is None and strange_unit(f"hip [{text}]", ()) is None
 
 
+@pytest.mark.parametrize(
+    "name", ["force (filtered) [N]", "pressure [bar] (gauge)", "x [counts] [mm]"]
+)
+def test_beside_a_known_unit_nothing_is_strange(name: str) -> None:
+    assert strange_unit(name, ("front", "rear")) is None
+
+
 def test_a_unit_inside_a_name_is_taken_where_there_is_one() -> None:
     assert named_unit("pos_mm_front") == ("pos_front", "mm")

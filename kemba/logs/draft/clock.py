@@ -162,16 +162,13 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
         step = float(np.median(np.diff(seconds[np.isfinite(seconds)])))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
-        if not (first <= step <= last or _since_1970(rows, unit)):
+        began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
+        stamped = 6e8 < began < 4.1e9  # since 1970: between 1990 and 2100
+        if not (first <= step <= last or stamped):
             question = (
                 f"are the rows {1e3 * step:.3g} ms apart? '{name}' has no unit: taken as {unit}"
             )
     return Clock(score, source, (name,), seconds, from_first, reason, question)
-
-
-def _since_1970(rows: Array, unit: str) -> bool:
-    """Whether stamps in this unit were taken between 1990 and 2100."""
-    return 6e8 < convert(float(rows[np.isfinite(rows)][0]), unit, "s") < 4.1e9
 
 
 def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:

@@ -3,7 +3,7 @@
 import json
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -101,17 +101,13 @@ def _numbers(lines: list[str], separator: str, decimal: str) -> tuple[int, int, 
     for number, line in enumerate(lines):
         if line.strip():
             cells = cells_of(line, separator)
-            rows.append((number, len(cells), _count(cells, decimal)))
+            rows.append((number, len(cells), sum(map(bool, map(NUMBER[decimal].fullmatch, cells)))))
     numeric = [(number, width, count) for number, width, count in rows if count >= 2]
     if not numeric:
         return 0, 0, 0
     width = Counter(width for _, width, _ in numeric).most_common(1)[0][0]
     table = [(number, count) for number, other, count in numeric if other == width]
     return sum(count for _, count in table), table[0][0], width
-
-
-def _count(cells: Sequence[str], decimal: str) -> int:
-    return sum(bool(NUMBER[decimal].fullmatch(cell)) for cell in cells)
 
 
 def _header(above: list[str], separator: str, width: int) -> tuple[int, int]:
@@ -209,10 +205,14 @@ def draft_map(
     missing = tuple(
         t.header for t in targets if t.needed and t.header not in {*found.pairs, *found.ties}
     )
-    ties = [f"{header} may be {_either(names_)}" for header, names_ in found.ties.items()]
+    ties = [
+        f"{header} may be {' or '.join(map(repr, names_))}" for header, names_ in found.ties.items()
+    ]
     unwrapped = [
         f"{h} begins anew after each turn: joined" for h, s in columns.items() if "unwrap" in s
     ]
+    maps = shipped_maps(raw.columns)
+    fitting = [f"the shipped map '{name}' fits these columns: --map {name}" for name in maps]
     return Draft(
         kind,
         layout | ({"origin": "first"} if stamp.from_first else {}),
@@ -220,14 +220,8 @@ def draft_map(
         missing,
         tuple(name for name in raw.columns if name not in read),
         tuple(filter(None, [stamp.question, *ties, *asked])),
-        (f"Time: {stamp.reason}.", *said, *raw.remarks, *unwrapped, *_shipped(raw.columns)),
+        (f"Time: {stamp.reason}.", *said, *raw.remarks, *unwrapped, *fitting),
     )
-
-
-def _shipped(names: Collection[str]) -> list[str]:
-    """Notes on shipped maps that fit these columns."""
-    return [f"the shipped map '{found}' fits these columns: --map {found}"
-            for found in shipped_maps(names)]  # fmt: skip
 
 
 def _spelt(units: Iterable[tuple[str, str]]) -> dict[str, str]:
@@ -348,10 +342,6 @@ def _by_number(source: dict[str, Any], number: Mapping[str, int]) -> dict[str, A
     if isinstance(name, str) and (name.isdigit() or re.search(r"#\d+$", name)):
         return {**source, "source": number.get(name, name)}
     return source
-
-
-def _either(names: Sequence[str]) -> str:
-    return " or ".join(f"'{name}'" for name in names)
 
 
 def _line(text: str) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.formats import check_size
-from kemba.logs.recording import TIME_WORD, Column, Group, Raw, Recording, recording, shared
+from kemba.logs.recording import TIME_WORD, Column, Group, Raw, Recording, free, recording, shared
 
 
 def read_mf4(path: Path) -> Recording:
@@ -37,7 +37,7 @@ def _mdf_group(file: Any, number: int) -> Group | None:
     for signal in signals:
         if signal.name in names or not len(signal.samples):
             continue
-        name = signal.name if signal.name not in columns else f"{signal.name}#{len(columns) + 1}"
+        name = free(signal.name, columns)
         invalid = signal.invalidation_bits
         columns[name] = (
             signal.samples if invalid is None else np.where(invalid, np.nan, signal.samples)

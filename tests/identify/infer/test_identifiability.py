@@ -1,9 +1,13 @@
 """What logs can tell before anything is looked for: by slopes, it is what fits find afterwards."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from toy_problem import Toy
 
+from kemba.identify.design.menu import splitting_test
 from kemba.identify.discover import discover, what_shows
 from kemba.identify.infer.identifiability import expected
 from kemba.identify.infer.search import Search
@@ -52,3 +56,11 @@ def test_the_expected_evidence_is_what_fits_differ_by() -> None:
     left = drag - known @ np.linalg.lstsq(known, drag, rcond=None)[0]
     assert nats[0, 1] == pytest.approx(0.5 * left @ left, rel=0.1)
     assert nats[1, 0] == nats[0, 1] and np.isinf(nats[0, 0])
+
+
+def test_of_a_rig_of_ones_own_no_standard_test_is_known() -> None:
+    twins = {name: SimpleNamespace(typical=dict) for name in ("axis_friction", "gear_friction")}
+    problem: Any = SimpleNamespace(candidates=twins)
+    found = splitting_test("pendulum_rig", problem, tuple(twins))
+    assert found.sentence == "no standard test tells apart axis_friction and gear_friction"
+    assert (found.test, found.nats, found.log_s) == ("", 0.0, 0.0), "as `--json` prints it"

@@ -4,6 +4,7 @@ On a linear problem nothing stands between them and the test but the test itself
 benchmarks/calibration.py asks the same of bench logs of the twin.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,6 +18,7 @@ from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.significance import (
     NullTest,
+    _evidence,
     best_gain,
     bootstrap,
     smallest_detectable,
@@ -121,3 +123,16 @@ def test_what_cannot_be_negative_is_positive_in_simulated_logs() -> None:
     silent = np.zeros((40, len(ranker.linear.names)))
     drag, twin = (np.median(bootstrap(ranker, silent, [n]).scores) for n in ("drag", "twin"))
     assert drag > twin + 0.3
+
+
+def test_what_simulated_logs_say_of_one_effect_is_what_the_ranking_says() -> None:
+    """By one factor of all effects, or by a factor for each."""
+    search = Search(Toy({"wave.a": 4.0, "drag.a": 2.0}))
+    search.start()
+    linear = search.base.point.mode.linear
+    ranker = search.base.ranker(replace(linear, at=linear.mean))
+    for tolerance in SpikeSlabSettings.tolerances:
+        found = _evidence(ranker, list(EFFECTS), ranker._slope[:, None], tolerance)[:, 0]
+        scores = [ranker._score(h, tolerance) for h in ((), *((effect,) for effect in EFFECTS))]
+        expected = np.array([score.log_evidence for score in scores])
+        assert found - found[0] == pytest.approx(expected - expected[0], abs=1e-6)
