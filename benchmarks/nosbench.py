@@ -12,13 +12,14 @@ The set states no licence: it is run, and not kept here.
 
 import argparse
 import json
+import multiprocessing
 import os
 import random
 import resource
-import subprocess
-import sys
 import time
 from collections import defaultdict
+from functools import cache
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -40,18 +41,24 @@ def files_of(folder: Path) -> tuple[list[Path], list[Path]]:
     return files[:half], files[half:]
 
 
+def tuned(folder: Path) -> list[tuple[Path, bool]]:
+    """The files that figures were chosen on, and whether they are large."""
+    seed, *counts = TUNED
+    rng, halves = random.Random(seed), files_of(folder)
+    return [(path, large) for half, n, large in zip(halves, counts, (False, True), strict=True)
+            for path in rng.sample(half, n)]  # fmt: skip
+
+
 def drawn(folder: Path, seed: int, count: int) -> list[tuple[Path, bool]]:
     """Files and whether they are large: `count`, half of them large, none that was tuned on."""
-    halves, (tuning, *counts) = files_of(folder), TUNED
-    rng = random.Random(tuning)
-    used = {path for half, n in zip(halves, counts, strict=True) for path in rng.sample(half, n)}
-    rng, chosen = random.Random(seed), []
-    for half in halves:
+    used, rng, chosen = dict(tuned(folder)), random.Random(seed), []
+    for half in files_of(folder):
         left = [path for path in half if path not in used]
         rng.shuffle(left)
         chosen.append(left[: count // 2])
-    both = zip(*chosen, strict=False)  # small and large in turn: any part of a run is balanced
-    return [pair for small, large in both for pair in ((small, False), (large, True))]
+    both = zip_longest(*chosen)  # small and large in turn: any part of a run is balanced
+    return [(path, large) for pair in both for path, large in zip(pair, (False, True), strict=True)
+            if path is not None]  # fmt: skip
 
 
 def load(path: Path) -> dict[str, Any]:
@@ -69,40 +76,52 @@ def load(path: Path) -> dict[str, Any]:
     return {"x": x, **parts, "bounds": bounds, "start": start, "p": (p, at)}
 
 
+@cache
+def methods() -> tuple[dict[str, Any], Any]:
+    """The methods, and what judges their points; imports are in nobody's CPU time."""
+    import scipy.optimize  # noqa: F401 (solve_mpcc imports it when it needs it)
+    from mpcc import on_nosbench, on_schedule
+
+    return {**on_nosbench.METHODS, **on_schedule.METHODS}, on_nosbench.judged
+
+
 def solved(path: Path, method: str) -> dict[str, Any]:
     """One solve: cost, violation, products, iterations and CPU seconds."""
-    from mpcc import on_nosbench
-
-    known = on_nosbench.METHODS
-    if method not in known:  # it imports the robot, which takes seconds
-        from mpcc import on_schedule
-
-        known = on_schedule.METHODS
+    known, judged = methods()
     begin = time.process_time()
     given = load(path)
     x, iterations = known[method](given)
     cpu = time.process_time() - begin
-    return {**on_nosbench.judged(given, x), "iterations": iterations, "cpu": cpu}
+    return {**judged(given, x), "iterations": iterations, "cpu": cpu}
 
 
 def tried(path: Path, method: str, limit: int) -> dict[str, Any]:
     """The same in a process of its own with `limit` CPU seconds."""
+    methods()
+    fork = multiprocessing.get_context("fork")  # what is imported need not be imported again
+    receive, send = fork.Pipe(duplex=False)
 
-    def bounded() -> None:
+    def one() -> None:
+        receive.close()
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # MUMPS prints
+        try:
+            send.send(solved(path, method))
+        except Exception as error:  # noqa: BLE001 (whatever a method raises is its answer)
+            send.send({"f": None, "why": f"{type(error).__name__}: {error}"[-120:]})
 
-    command = [sys.executable, __file__, "--one", str(path), method]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(command, capture_output=True, text=True, check=False, preexec_fn=bounded)
+    process = fork.Process(target=one)
+    process.start()
+    send.close()
     try:
-        answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    except (IndexError, ValueError):
-        last = (done.stderr.strip().splitlines() or ["no answer"])[-1][-120:]
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        spent = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-        why = f"stopped after {limit} CPU seconds" if done.returncode < 0 else last
-        answer = {"f": None, "violation": None, "products": None, "cpu": spent, "why": why}
-    return answer
+        answer: dict[str, Any] = receive.recv()
+    except EOFError:
+        answer = {"f": None, "why": f"stopped after {limit} CPU seconds"}
+    process.join()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    spent = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+    return {"violation": None, "products": None, "cpu": spent, **answer}
 
 
 def good(row: dict[str, Any]) -> bool:
@@ -172,12 +191,10 @@ def _whole(rows: list[dict[str, Any]]) -> dict[str, dict[str, dict[str, Any]]]:
 
 def main() -> None:
     """Solve what was not solved yet, or print and save the tables."""
-    if sys.argv[1:2] == ["--one"]:
-        print("\n" + json.dumps(solved(Path(sys.argv[2]), sys.argv[3])))
-        return
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, nargs="?", help="problems/casadi of the clone")
     parser.add_argument("--count", type=int, default=40, help="files, half of them large")
+    parser.add_argument("--tuned", action="store_true", help="the files figures were chosen on")
     parser.add_argument("--half", choices=("both", "smaller", "larger"), default="both")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--limit", type=int, default=100, help="CPU seconds of one solve")
@@ -189,14 +206,16 @@ def main() -> None:
     rows = [json.loads(line) for line in kept]
     have = {(row["file"], row["method"]) for row in rows}
     there = len(list(asked.folder.glob("*.json"))) if asked.folder else 0
-    files = drawn(asked.folder, asked.seed, asked.count) if asked.folder else []
+    files = []
+    if asked.folder is not None:
+        files = tuned(asked.folder) if asked.tuned else drawn(asked.folder, asked.seed, asked.count)
     for path, large in files:
         if asked.half not in ("both", "larger" if large else "smaller"):
             continue
         for method in asked.methods:
             if (path.name, method) in have:
                 continue
-            row = {"file": path.name, "large": large, "method": method, "seed": asked.seed,
+            row = {"file": path.name, "large": large, "tuned": asked.tuned, "method": method, "seed": asked.seed,
                    "there": there, "limit": asked.limit,
                    **tried(path, method, asked.limit)}  # fmt: skip
             rows.append(row)

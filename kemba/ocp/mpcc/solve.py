@@ -136,12 +136,12 @@ def _quiet() -> Iterator[None]:
         os.close(nothing)
 
 
-LOOSE = 100.0  # the first relaxation, in units of the products: hardly a pair binds
+PATHS = {"adaptive": (1.0, 0.01), "monotone": (100.0, 0.1)}
+# barriers, which lead to different local minima; the first relaxation, in units of the products;
+# the tolerance of a relaxed program, of its relaxation (of its square below one)
 FACTOR = 0.1  # from one relaxation to the next
 OFF = 1e-2  # distance of a warm start from bounds, of relaxations above
 LONG, BRANCH = 500, 150  # iterations of a relaxed program and of a branch
-EXACT = (0.1, 1.0)  # tolerances of a relaxed program, of its relaxation (of its square below one);
-# the second where the path of the first comes to an end at an infeasible point
 SCALED = {"nlp_scaling_method": "gradient-based", "acceptable_iter": 0}
 
 
@@ -153,16 +153,16 @@ class Solves:
     control: Control
     options: dict[str, Any]
     tell: Callable[[str], None]
-    exact: float = EXACT[0]
     iterations: int = 0
     endings: list[tuple[str, Ending, int]] = field(default_factory=list)
 
-    def relaxed(self, sigma: float, start: Iterate, warmly: bool = True) -> Iterate:
+    def relaxed(self, sigma: float, barrier: str, start: Iterate) -> Iterate:
         """The program with products at most `sigma`, solved as far as that is worth."""
-        tol = max(1e-8, self.exact * sigma * min(1.0, sigma))
+        tol = max(1e-8, PATHS[barrier][1] * sigma * min(1.0, sigma))
         options = {
             "tol": tol, "compl_inf_tol": tol, "constr_viol_tol": min(1e-4, tol),
-            "max_iter": LONG, **(warm(sigma, min(OFF, sigma)) if warmly else {}),
+            "max_iter": LONG, "mu_strategy": barrier, "mu_oracle": "quality-function",
+            **({} if start.ending is None else warm(sigma, min(OFF, sigma))),
         }  # fmt: skip
         return self._solve(f"relaxed by {sigma:.0e}", self.program.relaxed(sigma), start, options)
 
@@ -192,29 +192,13 @@ class CutShort(Exception):  # noqa: N818 (a way out, not an error)
         self.point = point
 
 
-def tighten(solves: Solves, point: Iterate, sigma: float, last: float) -> Iterate | None:
-    """From a point relaxed by `sigma` to one relaxed by `last`; None where a step on the way ends
-    at a point that violates least and still violates: tighter pairs would not mend it."""
-    while sigma > last * 1.0001:
-        sigma = max(last, FACTOR * sigma)
-        point = solves.relaxed(sigma, point)
-        if point.ending is Ending.INFEASIBLE:
-            return None
-    return point
-
-
-def loosest(solves: Solves) -> tuple[Iterate, float]:
-    """The first point, with pairs so loose that hardly one binds, and its relaxation."""
-    start = solves.program.start
-    sigma = LOOSE * max(1.0, solves.program.complementarity(start))
-    return solves.relaxed(sigma, Iterate(start), warmly=False), sigma
-
-
-TRIED = 1e-4  # relaxation from which a branch is tried; the next is the last
+TRIED = 1e-6  # relaxation from which a branch is tried; the next is the last
 MARGIN = 0.5  # the last relaxation, as a part of the tolerance: room for IPOPT's own
 SWITCHES = 5  # branches after the first
 PAYS = 1e-7  # relative fall of the cost that makes another branch worth while
 SLOPE = 1e-7  # relative fall of the linearised cost below which no direction descends
+COMPARED = 1e-2  # relaxation from which costs are exact enough to tell a path that is dearer
+WORTH = 1e-4  # relative fall of the cost below which another path is not worth while
 RESIDUAL = 1e-5  # of the Lagrangian's gradient at a stationary point
 
 
@@ -282,8 +266,10 @@ def solve_mpcc(
     The pairs are relaxed, G H <= sigma, from so loose that hardly one binds to tight (Scholtes,
     SIAM J. Optim. 11, 2001); then one side of every pair is zero, which is an ordinary program,
     and the products are exact. Where pairs have both sides at zero, multipliers or the linear
-    program with pairs say whether another branch descends, which is then taken. Local minima may
-    be found, as by every method of this kind.
+    program with pairs say whether another branch descends, which is then taken. Two such paths are
+    taken, with different barriers, and the cheaper point is kept; the second ends early where its
+    relaxed cost is not below the first's. Local minima may be found, as by every method of this
+    kind.
 
     Raises KembaError for parts that do not fit each other or are no numbers, and for bounds that
     are empty; a program that has no solution is no mistake: `status` says it.
@@ -291,11 +277,14 @@ def solve_mpcc(
     program = Mpcc(x, f, g, G, H, bounds, start, p)
     deadline = time.monotonic() + time_limit
     solves = Solves(program, Control(deadline=deadline), dict(options or {}), progress)
+    found: Found = Iterate(program.start), None
     try:
-        point, on = _found(solves, tolerance)
+        for barrier in PATHS:
+            found = _along(solves, barrier, found, tolerance)
     except CutShort as cut:
-        return replace(_judged(solves, cut.point, None, tolerance), status="time-limit")
-    return _judged(solves, point, on, tolerance)
+        if found[1] is None:
+            return replace(_judged(solves, cut.point, None, tolerance), status="time-limit")
+    return _judged(solves, *found, tolerance)
 
 
 @dataclass(frozen=True)
@@ -307,23 +296,38 @@ class OnBranch:
     stationarity: str
 
 
-def _found(solves: Solves, tolerance: float) -> tuple[Iterate, OnBranch | None]:
-    """The first feasible point of the paths, on a branch where one is; otherwise the last point."""
-    point = Iterate(solves.program.start)
-    for exact in EXACT:
-        solves.exact = exact
-        point, sigma = loosest(solves)
-        for last in (TRIED, MARGIN * tolerance):
-            tighter = tighten(solves, point, sigma, last)
-            if tighter is None:
-                break
-            point, sigma = tighter, last
-            best = _best_branch(solves, point, sigma, tolerance)
-            if best is not None:
-                return best
-        if _violation(solves.program, point.Y) <= tolerance:
+Found = tuple[Iterate, OnBranch | None]
+
+
+def _along(solves: Solves, barrier: str, best: Found, tolerance: float) -> Found:
+    """The cheaper of `best` and the first feasible point on a path from loose to tight pairs.
+
+    The path ends where its relaxed cost, which tighter pairs only raise, is not below the best
+    one, and at a point that violates least and still violates: tighter pairs would not mend it.
+    """
+    program, point = solves.program, Iterate(solves.program.start)
+    enough = best[0].objective - WORTH * _size(best[0]) if best[1] else np.inf
+    last = MARGIN * tolerance
+    for sigma in _relaxations(program, PATHS[barrier][0], last):
+        point = solves.relaxed(sigma, barrier, point)
+        dear = sigma <= COMPARED and point.solved and point.objective > enough
+        if dear or point.ending is Ending.INFEASIBLE:
             break
-    return point, None
+        if sigma in (TRIED, last):
+            found = _best_branch(solves, point, sigma, tolerance)
+            if found is not None:
+                return found if found[0].objective < enough else best
+    return best if best[1] is not None else (point, None)
+
+
+def _relaxations(program: Mpcc, loose: float, last: float) -> list[float]:
+    """Bounds of the products, from so loose that hardly one binds to `last`."""
+    sigma, all_ = loose * max(1.0, program.complementarity(program.start)), []
+    for end in (max(TRIED, last), last):
+        while sigma > end * 1.0001:
+            all_.append(sigma)
+            sigma = max(end, FACTOR * sigma)
+    return [*all_, last]
 
 
 def _best_branch(
