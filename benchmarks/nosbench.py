@@ -29,8 +29,8 @@ from block import put_block
 
 BEGIN, END = "<!-- written by benchmarks/nosbench.py -->", "<!-- end of nosbench -->"
 FEASIBLE, DEARER = 1e-6, 1e-4
-COMPARED = ("plain homotopy", "schedule of the plans", "solve_mpcc")  # on every file
-METHODS = (*COMPARED, "Uno")  # on the first files alone: it takes longest
+COMPARED = ("plain homotopy", "solve_mpcc")  # files on which both were run are counted
+METHODS = ("plain homotopy", "schedule of the plans", "solve_mpcc", "Uno")
 TUNED = (57, 30, 12)  # seed, and how many files of the smaller and of the larger half
 
 
@@ -107,7 +107,7 @@ def tried(path: Path, method: str, limit: int) -> dict[str, Any]:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # MUMPS prints
         try:
             send.send(solved(path, method))
-        except Exception as error:  # noqa: BLE001 (whatever a method raises is its answer)
+        except Exception as error:  # whatever a method raises is its answer
             send.send({"f": None, "why": f"{type(error).__name__}: {error}"[-120:]})
 
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -167,17 +167,25 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def page(rows: list[dict[str, Any]]) -> list[str]:
-    """All lines: the smaller files, the larger ones, which were run."""
+    """All lines: the smaller files, the larger ones, those that were tuned on."""
     from kemba.sweep import machine
 
+    drawn_files = [row for row in rows if not row.get("tuned")]
+    groups = {
+        "The smaller half": [row for row in drawn_files if not row["large"]],
+        "The larger half": [row for row in drawn_files if row["large"]],
+        "On which figures were chosen": [row for row in rows if row.get("tuned")],
+    }
     lines = []
-    for large, words in ((False, "smaller"), (True, "larger")):
-        of = [row for row in rows if row["large"] == large]
-        count = len(_whole(of))
-        lines += [f"The {words} half, {count} files:", "", *table(of), ""]
-    limit, seed, there = rows[0]["limit"], rows[0]["seed"], rows[0]["there"]
-    lines += [f"Drawn with seed {seed} from {there} files that were there; {limit} CPU seconds "
-              f"at most each, one process of this script at a time. On {machine()}."]  # fmt: skip
+    for words, of in groups.items():
+        if whole := _whole(of):
+            lines += [f"{words}, {len(whole)} files:", "", *table(of), ""]
+    limits = {method: max(row["limit"] for row in rows if row["method"] == method)
+              for method in METHODS if any(row["method"] == method for row in rows)}  # fmt: skip
+    seed, there = rows[0]["seed"], rows[0]["there"]
+    most = ", ".join(f"{method} {limit}" for method, limit in limits.items())
+    lines += [f"Drawn with seed {seed} from {there} files that were there. CPU seconds of one "
+              f"solve at most: {most}. On {machine()}."]  # fmt: skip
     return lines
 
 
@@ -215,8 +223,8 @@ def main() -> None:
         for method in asked.methods:
             if (path.name, method) in have:
                 continue
-            row = {"file": path.name, "large": large, "tuned": asked.tuned, "method": method, "seed": asked.seed,
-                   "there": there, "limit": asked.limit,
+            row = {"file": path.name, "large": large, "tuned": asked.tuned, "method": method,
+                   "seed": asked.seed, "there": there, "limit": asked.limit,
                    **tried(path, method, asked.limit)}  # fmt: skip
             rows.append(row)
             with asked.results.open("a") as file:

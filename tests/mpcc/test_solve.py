@@ -1,5 +1,6 @@
 """kemba.solve_mpcc on small programs whose solutions are known."""
 
+import time
 from typing import Any
 
 import casadi as ca
@@ -13,7 +14,16 @@ from mpcc_set import judged
 import kemba
 from kemba.errors import KembaError
 from kemba.ocp.mpcc.problem import Mpcc
-from kemba.ocp.mpcc.solve import both_zero, descending, multipliers, pulled
+from kemba.ocp.mpcc.solve import (
+    OnBranch,
+    Solves,
+    _along,
+    both_zero,
+    descending,
+    multipliers,
+    pulled,
+)
+from kemba.ocp.nlp.ipopt import Control, Iterate
 
 x = ca.SX.sym("x", 2)
 CORNER = (x[0] - 1) ** 2 + (x[1] - 1) ** 2
@@ -132,6 +142,33 @@ def test_the_time_limit_leaves_a_judged_point() -> None:
     found = solve(CORNER, time_limit=0.0)
     assert found.status == "time-limit" and not found.good
     assert np.isfinite(found.feasibility)
+
+
+@pytest.mark.parametrize(("known", "kept"), [(0.5, True), (1.5, False)])
+def test_a_path_that_is_not_cheaper_ends_early(known: float, kept: bool) -> None:
+    """The optimum is 1: where a point with cost 0.5 is known, no branch is solved."""
+    names: list[str] = []
+    program = Mpcc(x, CORNER, ca.SX(0, 1), x[0], x[1], {}, 0.0, None)
+    of = multipliers(program, np.zeros(2), np.zeros(1), np.array([True]))
+    best = Iterate(np.zeros(2), objective=known), OnBranch(np.array([True]), of, "strong")
+    found = _along(Solves(program, Control(), {}, names.append), "monotone", best, 1e-6)
+    assert (found is best) == kept and ("branch" not in names) == kept
+    assert found[0].objective == pytest.approx(min(known, 1.0), abs=1e-6)
+
+
+def test_a_time_limit_in_the_second_path_leaves_the_point_of_the_first(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    names: list[str] = []
+
+    def progress(name: str) -> None:
+        names.append(name)
+        if names.count("relaxed by 1e+00") == 2:
+            monkeypatch.setattr(time, "monotonic", lambda: np.inf)
+
+    found = solve(CORNER, time_limit=1e6, progress=progress)
+    assert names[-1] == "relaxed by 1e+00"
+    assert found.good and found.f == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -154,7 +154,6 @@ class Solves:
     options: dict[str, Any]
     tell: Callable[[str], None]
     iterations: int = 0
-    endings: list[tuple[str, Ending, int]] = field(default_factory=list)
 
     def relaxed(self, sigma: float, barrier: str, start: Iterate) -> Iterate:
         """The program with products at most `sigma`, solved as far as that is worth."""
@@ -177,9 +176,7 @@ class Solves:
         ipopt = Ipopt(rows, {**SCALED, **self.options}, self.control)
         found = ipopt.solve(start, self.program.p.tolist(), options)
         self.iterations += found.iterations
-        assert found.ending is not None
-        self.endings.append((name, found.ending, found.iterations))
-        if found.ending.cut_short:
+        if found.ending is not None and found.ending.cut_short:
             raise CutShort(found)
         return found
 
@@ -341,9 +338,8 @@ def _best_branch(
     best: tuple[Iterate, OnBranch] | None = None
     for _ in range(SWITCHES + 1):
         found = solves.branch(first, point, sigma)
-        if not found.solved or _violation(program, found.Y) > tolerance:
-            return best
-        if best is not None and found.objective > best[0].objective - PAYS * _size(best[0]):
+        dearer = best and found.objective > best[0].objective - PAYS * _size(best[0])
+        if dearer or not found.solved or _violation(program, found.Y) > tolerance:
             return best
         on, other = _stationary(program, found, first, tolerance)
         best = found, on
