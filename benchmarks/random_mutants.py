@@ -1,14 +1,15 @@
 """Do the tests notice bugs that nobody chose? One-line changes at random places of the new code.
 
-    python benchmarks/random_mutants.py --draw 120 --seed 57  # a new list, none of it tried
-    python benchmarks/random_mutants.py --cover               # which test runs which line, once
-    python benchmarks/random_mutants.py                       # try those that were not tried yet
-    python benchmarks/random_mutants.py --again               # the survivors, with today's tests
+    python benchmarks/random_mutants.py --draw 40 --seed 61 --since f2f25f85  # newer lines only
+    python benchmarks/random_mutants.py --cover tests/model tests/ocp  # which test runs which line
+    python benchmarks/random_mutants.py                  # try those that were not tried yet
+    python benchmarks/random_mutants.py --again          # the survivors, with today's tests
 
 The list with its outcomes is benchmarks/random_mutants.jsonl; it is kept after every bug, so that
-an interrupted study goes on. Survivors that change no behaviour stand, by hand, in
-benchmarks/random_mutants.yaml. A bug is run against all quick tests that run its line, quickest
-first. Needs the test dependencies and pytest-cov: pip install '.[test]' pytest-cov.
+an interrupted study goes on. A draw drops what was never tried and keeps the rest. Survivors that
+change no behaviour stand, by hand, in benchmarks/random_mutants.yaml. A bug is run against all
+quick tests that run its line, quickest first. Needs the test dependencies and pytest-cov:
+pip install '.[test]' pytest-cov.
 """
 
 import argparse
@@ -16,6 +17,7 @@ import ast
 import json
 import os
 import random
+import re
 import subprocess
 import sys
 import tempfile
@@ -28,8 +30,6 @@ from mutants import ROOT, Copy, Mutant  # beside this script
 from mutations import Change, Places
 
 LIST = Path(__file__).with_suffix(".jsonl")
-CODE = """kemba/ocp/task kemba/ocp/reading.py kemba/ocp/refinement kemba/scene kemba/solve
-kemba/identify/infer kemba/logs""".split()
 FOLDER = Path(tempfile.gettempdir())
 LINES, SECONDS = FOLDER / "kemba-lines-of-tests.db", FOLDER / "kemba-seconds-of-tests.xml"
 
@@ -46,17 +46,29 @@ def kinds() -> dict[str, list[str]]:
     return found
 
 
-def drawn(number: int, seed: int) -> list[dict[str, Any]]:
+def newer(since: str) -> dict[str, set[int]]:
+    """Lines of each file of kemba that were not there in this commit."""
+    command = ["git", "diff", "-U0", "--no-color", since, "--", "kemba/*.py"]
+    told = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    found: dict[str, set[int]] = {}
+    for line in told.splitlines():
+        if line.startswith("+++ "):
+            lines = found.setdefault(line[4:].removeprefix("b/"), set())
+        elif part := re.match(r"@@ -\S+ \+(\d+),?(\d*) @@", line):
+            lines |= set(range(int(part[1]), int(part[1]) + int(part[2] or 1)))
+    return {name: lines for name, lines in found.items() if lines and name != "/dev/null"}
+
+
+def drawn(number: int, seed: int, since: str) -> list[dict[str, Any]]:
     """So many changes at random, each with enough lines before it to stand once in its file."""
     alike, places = kinds(), list[tuple[str, str, Change]]()
-    for code in CODE:
-        for path in sorted((ROOT / code).rglob("*.py")) or [ROOT / code]:
-            text = path.read_text(encoding="utf-8")
-            name = path.relative_to(ROOT).as_posix()
-            places += [(name, text, change) for change in Places(text, alike).found]
+    for name, lines in sorted(newer(since).items()):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        places += [(name, text, c) for c in Places(text, alike).found if c[0] in lines]
     random.Random(seed).shuffle(places)
     found = [bug for place in places if (bug := record(*place))]
-    return [{**bug, "seed": seed, "places": len(found)} for bug in found[:number]]
+    draw = {"seed": seed, "since": since, "places": len(found)}
+    return [{**bug, **draw} for bug in found[:number]]
 
 
 def record(file: str, text: str, change: Change) -> dict[str, Any] | None:
@@ -77,13 +89,13 @@ def record(file: str, text: str, change: Change) -> dict[str, Any] | None:
     return {"file": file, "line": number, "operator": operator, "was": was, "now": now}
 
 
-def cover() -> None:
-    """Run the quick tests once; keep which lines of the code each of them runs, and how long."""
-    measured = [f"--cov={code.removesuffix('.py')}" for code in CODE]
-    how = ["--cov-context=test", "--cov-report=", "-o", "junit_family=xunit1"]
-    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider"]
+def cover(tests: list[str]) -> None:
+    """Run quick tests once (all where none are named); keep which lines of the code each of them
+    runs, and how long."""
+    how = ["--cov=kemba", "--cov-context=test", "--cov-report=", "-o", "junit_family=xunit1"]
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", *tests]
     setting = {**os.environ, "COVERAGE_FILE": str(LINES)}
-    subprocess.run([*command, *measured, *how, f"--junitxml={SECONDS}"], cwd=ROOT, env=setting)
+    subprocess.run([*command, *how, f"--junitxml={SECONDS}"], cwd=ROOT, env=setting)
 
 
 def function(test: str) -> str:
@@ -117,16 +129,18 @@ class Covering:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--draw", type=int, default=0, help="make a new list of so many")
+    parser.add_argument("--draw", type=int, default=0, help="add so many to what was tried")
     parser.add_argument("--seed", type=int, default=57)
-    parser.add_argument("--cover", action="store_true", help="which test runs which line")
+    parser.add_argument("--since", default="", help="commit: only lines that it does not have")
+    parser.add_argument("--cover", nargs="*", help="which of these tests runs which line")
     parser.add_argument("--again", action="store_true", help="try those that survived once more")
     parser.add_argument("--only", default="", help="those whose file contains this")
     arguments = parser.parse_args()
     if arguments.draw:
-        keep(drawn(arguments.draw, arguments.seed))
-    elif arguments.cover:
-        cover()
+        tried = [bug for bug in listed() if "outcome" in bug]
+        keep(tried + drawn(arguments.draw, arguments.seed, arguments.since))
+    elif arguments.cover is not None:
+        cover(arguments.cover)
     else:
         study("again" if arguments.again else "outcome", arguments.only)
 
