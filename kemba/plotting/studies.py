@@ -213,7 +213,8 @@ def plot_robustness(
     left.set_xlabel("apex [m]")
     left.set_ylabel("executions")
     key_above(left)
-    order = sorted(ranks, key=lambda name: _size(ranks[name]))
+    size = {n: 2 * abs(r.get("landing") or 0) + abs(r.get("apex") or 0) for n, r in ranks.items()}
+    order = sorted(ranks, key=lambda name: size[name])  # landing first
     for answer, hue, shift in (("landing", VERMILLION, 0.2), ("apex", BLUE, -0.2)):
         lengths: Sequence[float] = [ranks[name].get(answer) or 0.0 for name in order]
         right.barh(np.arange(len(order)) + shift, lengths, 0.36, color=hue, label=answer)
@@ -223,8 +224,3 @@ def plot_robustness(
     right.set_xlabel("rank correlation")
     key_above(right)
     return figure
-
-
-def _size(found: Mapping[str, float | None]) -> float:
-    """By what conditions are sorted: landing first."""
-    return 2 * abs(found.get("landing") or 0.0) + abs(found.get("apex") or 0.0)
