@@ -1,10 +1,14 @@
-"""Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake."""
+"""Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake, and
+on those of several columns together."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
+from kemba.effects.pneumatics.switching import Pulse
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
 from kemba.identify.problem.types import Array
@@ -13,85 +17,114 @@ Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 BETTER = 4.0  # factor by which a mix-up must fit better
 SMALL = 4.0  # error, in sigmas, that no mix-up would leave
 CLOSE = 0.25  # share of the force's spread that a mix-up may leave
+ALIKE = 1.5  # factor within which the force does not tell mix-ups apart
 NOTHING = 1.2  # share of the spread left by a model that explains nothing
 LATEST = 0.015  # a longer lag is no sensor's delay but another clock [s]
 RESOLUTION = 1e-3  # resolution of lags [s]: a usual row
 SHORTEST = 400  # steps of resolution that a lag can be read from
 FARTHEST = 0.5  # longest lag [s]
-ALIKE = 0.3  # correlation that a lag must reach
+LIKE = 0.3  # correlation that a lag must reach
 MORE_ALIKE = 1.5  # factor by which a lag must raise the correlation
 
-
-def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[str, BenchLog]]:
-    """What may be wrong with a log, and the log with that put right; `stroke` [m] of the
-    cylinder."""
-    extend, retract = run.commands
-    force = run.measured["piston/F"]
-    yield (
-        "piston/F has the reversed sign (pushing is positive)",
-        replace(run, measured={**run.measured, "piston/F": -force}),
-    )
-    yield ("valve/extend and valve/retract are swapped", replace(run, commands=(retract, extend)))
-    yield (
-        "valve/extend and valve/retract are inverted (1 is on)",
-        replace(run, commands=(_inverted(extend), _inverted(retract))),
-    )
-    motion = run.motion
-    flipped = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
-    yield "piston/x counts from the extended end (0 is retracted)", replace(run, motion=flipped)
-    for factor, unit in ((1e3, "kN"), (1e-3, "mN"), (4.4482, "lbf"), (9.81, "kgf")):
-        yield (
-            f"piston/F seems to be in {unit}",
-            replace(run, measured={**run.measured, "piston/F": factor * force}),
-        )
-    for factor, unit in ((10.0, "dm"), (0.0254 * 1e0, "inches")):
-        motion = run.motion
-        scaled = replace(motion, x=factor * motion.x, v=factor * motion.v, a=factor * motion.a)
-        yield f"piston/x seems to be in {unit}", replace(run, motion=scaled)
+UNITS = {"": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482, "kgf": 9.81}  # [N]
+END = "piston/x counts from the extended end (0 is retracted)"
+REVERSED = "piston/F has the reversed sign (pushing is positive)"
+Texts = tuple[str, ...]  # mistakes
+Left = dict[Texts, float]  # the share of the force's spread that is left without them
 
 
 def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[KembaError]:
-    """What must be wrong with a run's columns, if anything."""
-    path = run.name
-    error, scale = _misfit(run, predict)
-    if error < SMALL * run.sigma["piston/F"]:
+    """What must be wrong with a run's columns, if anything; `stroke` [m] of the cylinder."""
+    as_read, force = _left(run, predict), run.measured["piston/F"][run.keep["piston/F"]]
+    if not as_read or as_read[()] < (small := SMALL * run.sigma["piston/F"] / _spread(force)):
         return []
-    trials = [(text, _misfit_mixed_up(trial, predict)) for text, trial in mix_ups(run, stroke)]
-    text, (best, spread) = min(trials, key=lambda t: t[1][0] / t[1][1])
-    if best / spread < CLOSE and best / spread * BETTER < error / scale:
-        return [KembaError(path, text, "the force answers the valves so much better then")]
-    lagging = _clock(run, predict)
-    if lagging:
+    trials = {
+        some + more: (trial, more, left)
+        for some, trial in mix_ups(run, stroke)
+        for more, left in _left(trial, predict).items()
+    }
+    least = min(left for _, _, left in trials.values())
+    small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
+    close = [t for t, (_, _, left) in trials.items() if left <= max(ALIKE * least, small)]
+    simple = [texts for texts in close if len(texts) == len(min(close, key=len))]
+    if simple != [()] and least < CLOSE and least * BETTER < as_read[()]:
+        said = [" and ".join(texts) for texts in simple]
+        if END in simple[0]:
+            said[0] += _zero(*trials[simple[0]], stroke, predict)
+        what = "the force answers the valves so much better then"
+        return [KembaError(run.name, "; or ".join(said), what)]
+    if lagging := _clock(run, predict):
         return lagging
-    if error > NOTHING * scale and scale > 0:
+    if as_read[()] > NOTHING:
         return [
             KembaError(
-                path,
+                run.name,
                 "piston/F does not follow the valves at all",
-                f"the model leaves {error / scale:.1f} of its spread",
+                f"the model leaves {as_read[()]:.1f} of its spread",
                 "are columns swapped, or the logs of another test?",
             )
         ]
     return []
 
 
-def _misfit(run: BenchLog, predict: Predict) -> tuple[float, float]:
-    """Median error of the nominal prediction and spread of the measured force."""
-    keep = run.keep["piston/F"]
-    force = run.measured["piston/F"][keep]
+def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
+    """What may be wrong with valves and position, and the log with that put right."""
+    extend, retract = run.commands
+    off, out = _inverted(extend), _inverted(retract)
+    swapped, both = "valve/extend and valve/retract are swapped", "(1 is on)"
+    inverted = f"valve/extend and valve/retract are inverted {both}"
+    valves: list[tuple[Texts, tuple[list[Pulse], list[Pulse]]]] = [
+        ((), run.commands),
+        ((swapped,), (retract, extend)),
+        ((inverted,), (off, out)),
+        ((swapped, inverted), (out, off)),
+        ((f"valve/extend is inverted {both}",), (off, retract)),
+        ((f"valve/retract is inverted {both}",), (extend, out)),
+    ]
+    motion = run.motion
+    turned = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
+    for (some, commands), (more, place) in product(valves, (((), motion), ((END,), turned))):
+        yield some + more, replace(run, commands=commands, motion=place)
+
+
+def _left(run: BenchLog, predict: Predict) -> Left:
+    """What may be wrong with the force, and what is left with that put right. Nothing where a
+    mix-up leads the model to no prediction, as to a negative volume."""
+    force, found = run.measured["piston/F"][run.keep["piston/F"]], {}
     with np.errstate(over="ignore", invalid="ignore"):  # a mix-up may lead anywhere
-        error = float(np.sqrt(np.mean((predict(run)[keep] - force) ** 2)))
-    error = error if np.isfinite(error) else np.inf
-    return error, max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
+        try:
+            predicted = predict(run)[run.keep["piston/F"]]
+        except KembaError:
+            return {}
+        for sign, (unit, factor) in product((1.0, -1.0), UNITS.items()):
+            texts = (REVERSED,) * (sign < 0.0) + (f"piston/F seems to be in {unit}",) * bool(unit)
+            gap, spread = predicted - sign * factor * force, _spread(factor * force)
+            found[texts] = float(np.sqrt(np.mean(gap**2))) / spread
+            if sign < 0.0:
+                moved = f"`sign: -1, offset: {np.mean(gap):+.3g} N`"
+                zero = (*texts, f"piston/F counts from another zero ({moved})")
+                found[zero] = float(np.std(gap)) / spread
+    return {texts: left for texts, left in found.items() if np.isfinite(left)}
 
 
-def _misfit_mixed_up(trial: BenchLog, predict: Predict) -> tuple[float, float]:
-    """The same for a mix-up; infinite where it leads the model to no prediction, as to a negative
-    volume."""
-    try:
-        return _misfit(trial, predict)
-    except KembaError:
-        return np.inf, 1.0
+def _spread(force: Array) -> float:
+    """Spread [N] of a force (n,), at least 1 N."""
+    return max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
+
+
+def _zero(run: BenchLog, texts: Texts, left: float, stroke: float, predict: Predict) -> str:
+    """The zero beside the extended end without which much less is `left`, in words; `texts`: what
+    is wrong with the force."""
+
+    def error(zero: float) -> float:
+        motion = replace(run.motion, x=run.motion.x + zero)
+        return _left(replace(run, motion=motion), predict).get(texts, np.inf)
+
+    best = minimize_scalar(error, bounds=(-stroke / 4, stroke / 4), method="bounded")
+    if best.fun * ALIKE > left:
+        return ""
+    moved = f"`sign: -1, offset: {1e3 * (stroke + best.x):.1f} mm`"
+    return f" and piston/x counts from another zero ({moved})"
 
 
 def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
@@ -116,7 +149,7 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     if place in (0, 2 * far):  # the correlation still rises there: this is no lag
         return []
     lag = (place - far) * RESOLUTION
-    if abs(lag) <= LATEST or near.max() < ALIKE:
+    if abs(lag) <= LATEST or near.max() < LIKE:
         return []
     if near.max() < MORE_ALIKE * both[middle]:
         return []

@@ -57,7 +57,7 @@ class MixUp:
 
     `at`: where it is that of a zero, the same for a zero that is so much more, up to `reach`; it is
     where the lowest foot is on the ground if that is infinite. `small`: it is an effect, which a
-    sensor may have.
+    sensor may have. `plain`: the mistake that is left where the zero beside it is one.
     """
 
     text: str
@@ -66,6 +66,7 @@ class MixUp:
     at: Callable[[float], MixUp] | None = None
     reach: float = 0.0
     small: bool = False
+    plain: str = ""
 
 
 Some = Sequence[MixUp]
@@ -91,10 +92,10 @@ def mixed_up(
     goal = min(2.0 * STILL, error / BETTER)
     if lengths:
         goal = min(goal, ALIKE * (feet.restless([], lengths) or goal))
+    fitted = list(map(feet.fitted, known))
     for count in range(1, 2 if lengths or error < SMALL else 3):
-        pool = combinations([m for m in known if count == 1 or not m.small], count)
-        apart = (some for some in pool if count == 1 or not some[0].about & some[1].about)
-        trials = [(feet.restless(some) or np.inf, some) for some in map(feet.fitted, apart)]
+        pool = ([m] for m in fitted) if count == 1 else feet.pairs(known, fitted)
+        trials = [(feet.restless(some) or np.inf, some) for some in map(feet.with_height, pool)]
         best = min(after for after, _ in trials)
         if best < goal:
             close = [some for after, some in trials if after < min(goal, ALIKE * best)]
@@ -102,6 +103,8 @@ def mixed_up(
             if not all(feet.is_effect(some, least) for some in close):
                 rest = [left(corrected(log, physics, some)) for some in close]
                 close = [s for s, e in zip(close, rest, strict=True) if e <= SAME * min(rest)]
+            texts = {m.text for some in close for m in some}
+            close = [some for some in close if not any(m.plain in texts for m in some)]
             if not any(feet.is_effect(some, least) for some in close):
                 yield _said(log.name, error, best, close)
             return
@@ -142,7 +145,10 @@ def _changed(y: Columns, some: Some) -> dict[str, Any]:
 def _number(value: float, unit: str) -> str:
     """A zero [rad or m] in words."""
     shown, word = (1e3 * value, "mm") if unit == "m" else (np.degrees(value), "degrees")
-    return f"{shown:+.{0 if abs(shown) >= 10 else 1}f} {word}"
+    return f"{round(shown, 0 if word == 'mm' and abs(shown) >= 10 else 1):+g} {word}"
+
+
+TURNED = "body/pitch has the reversed sign (nose up is positive)"
 
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
@@ -150,6 +156,8 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
     yield from slight(legs)
     yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
     yield _zero("body/pitch counts from another zero", ["body/pitch"])
+    text = "body/pitch has the reversed sign and another zero"
+    yield _zero(text, ["body/pitch"], -1.0, plain=TURNED)
     yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
     yield _zero("body/z counts from another zero", ["body/z"])
     yield _zero("body/z counts downwards from a zero", ["body/z"], -1.0)
@@ -164,17 +172,20 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
         hips, torques, pistons = (
             [f"{leg}/{x}" for leg in some] for x in ("hip/q", "hip/tau", "piston/x")
         )
-        yield _each(f"hip/q of {whose} has the reversed sign", hips, np.negative)
-        text = f"hip/q and hip/tau of {whose} have the reversed sign"
-        yield _each(text, [*hips, *torques], np.negative)
-        yield _zero(f"hip/q of {whose} counts from another zero", hips)
-        for start in (QUARTER, -QUARTER, 2 * QUARTER):
+        for start in (0.0, QUARTER, -QUARTER, 2 * QUARTER):
             yield _zero(f"hip/q of {whose} counts from another zero", hips, 1.0, start)
-            text = f"hip/q of {whose} has the reversed sign and another zero"
-            yield _zero(text, hips, -1.0, -start)
+        for also, said in (([], "hip/q of {} has"), (torques, "hip/q and hip/tau of {} have")):
+            text = f"{said.format(whose)} the reversed sign"
+            yield _each(text, [*hips, *also], np.negative)
+            for start in (0.0, QUARTER, -QUARTER, 2 * QUARTER):
+                plain = text if start == 0.0 else ""
+                zero = f"{text} and {'hip/q ' if also else ''}another zero"
+                yield _zero(zero, hips, -1.0, -start, plain=plain, also=also)
+        yield _zero(f"piston/x of {whose} counts from another zero", pistons, reach=stroke / 4)
         text = f"piston/x of {whose} counts from the extended end"
         yield _each(text, pistons, lambda x: stroke - x)
-        yield _zero(f"piston/x of {whose} counts from another zero", pistons, reach=stroke / 4)
+        zero = f"{text} and another zero"
+        yield _zero(zero, pistons, -1.0, -stroke, stroke / 4, plain=text)
     if len(legs) == 2:
         columns = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
         pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in columns]
@@ -192,9 +203,7 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
 
 def slight(legs: Sequence[str]) -> Iterator[MixUp]:
     """Those of them that move feet by millimetres only in a motion that is even and upright."""
-    yield _each(
-        "body/pitch has the reversed sign (nose up is positive)", ["body/pitch"], np.negative
-    )
+    yield _each(TURNED, ["body/pitch"], np.negative)
     if len(legs) == 2:
         yield _swap(
             "piston/x of the legs is swapped", (f"{legs[0]}/piston/x", f"{legs[1]}/piston/x")
@@ -246,8 +255,11 @@ def _zero(
     sign: float = 1.0,
     start: float = 0.0,
     reach: float | None = None,
+    plain: str = "",
+    also: Sequence[str] = (),
 ) -> MixUp:
-    """A zero (and a sign): what is true is sign * reading - zero."""
+    """A zero (and a sign): what is true is sign * reading - zero; `also` has the sign alone. So has
+    `plain`, where `start` is the zero."""
     if reach is None:
         reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
     bias = SensorBias(channel=names[0])
@@ -255,9 +267,18 @@ def _zero(
 
     def at(more: float) -> MixUp:
         zero = start + more
-        said = f"{text} ({_number(sign * zero, bias.unit)} too much)"
-        found = _each(said, names, lambda x: sign * x - zero)
-        return replace(found, small=sign > 0.0 and abs(zero) < least)
+        number = _number(sign * zero, bias.unit)
+        said = f"{number} too much" if sign > 0.0 else f"`sign: -1, offset: {number}`"
+        there = _each("", names, lambda x: sign * x - zero)
+        turned = _each("", also, np.negative)
+        slight = abs(more) < least
+        return MixUp(
+            f"{text} ({said})",
+            there.about | turned.about,
+            lambda y: {**there.change(y), **turned.change(y)},
+            small=sign > 0.0 and start == 0.0 and slight,
+            plain=plain if slight else "",
+        )
 
     return replace(at(0.0), at=at, reach=reach)
 
@@ -307,6 +328,11 @@ class _Feet:
         foot in a quarter of them at least: the largest of these quantiles. None where too few rows
         tell it.
         """
+        found = self._restless(some, lengths)
+        return None if found is None else float(max(found))
+
+    def _restless(self, some: Some, lengths: Theta | None = None) -> Array | None:
+        """The same of the lowest foot, and of each (1 + legs,)."""
         if not self.enough:
             return None
         places, rows = self._places(some, lengths)
@@ -317,33 +343,52 @@ class _Feet:
         before, now, after = (places[rows + k] for k in (-self.half, 0, self.half))
         far = np.hypot(now[:, :, 1], np.linalg.norm(after - before, axis=2))
         lowest = np.argmin(now[:, :, 1], axis=1)[:, None]
-        nearest = np.take_along_axis(far, lowest, axis=1)
-        return float(max(np.quantile(nearest, 0.75), np.quantile(far, 0.25, axis=0).max()))
+        nearest = np.quantile(np.take_along_axis(far, lowest, axis=1), 0.75)
+        return np.append(nearest, np.quantile(far, 0.25, axis=0))
 
-    def fitted(self, some: Some) -> list[MixUp]:
-        """Mistakes about zeros, each with that after which feet stand best; of two mistakes only
-        that of the height is fitted."""
-        found = list(some)
-        for i, mistake in enumerate(some):
-            at = mistake.at
-            if at is None or (len(some) > 1 and np.isfinite(mistake.reach)):
-                continue
-            if np.isfinite(mistake.reach):
-                grid = np.linspace(-mistake.reach, mistake.reach, GRID)
-                left = [self.restless([at(more)]) or np.inf for more in grid]
-                near, step = grid[int(np.argmin(left))], grid[1] - grid[0]
-                best = minimize_scalar(
-                    lambda more, at=at: self.restless([at(more)]) or np.inf,
-                    bounds=(near - step, near + step),
-                    method="bounded",
-                    options={"xatol": FINE * mistake.reach},
-                )
-                found[i] = at(float(best.x))
-            else:
-                places, rows = self._places(some)
-                lowest = places[rows, :, 1].min(axis=1)
-                found[i] = at(float(np.median(lowest)) if len(rows) else 0.0)
-        return found
+    def with_height(self, some: Some) -> Some:
+        """Mistakes of which that about the zero of the height is the one after which feet are on
+        the ground."""
+        if not any(np.isinf(m.reach) for m in some):
+            return some
+        places, rows = self._places(some)
+        lowest = float(np.median(places[rows, :, 1].min(axis=1))) if len(rows) else 0.0
+        return [m.at(lowest) if m.at and np.isinf(m.reach) else m for m in some]
+
+    def fitted(self, mistake: MixUp) -> MixUp:
+        """A mistake about a zero within reach, with that after which feet stand best: those of the
+        legs that it is about, if it is about legs alone."""
+        at, reach = mistake.at, mistake.reach
+        if at is None or np.isinf(reach):
+            return mistake
+        own = [1 + i for i in self._legs(mistake)]
+
+        def error(more: float) -> float:
+            found = self._restless([at(more)])
+            return np.inf if found is None else float(sum(found[own]) if own else max(found))
+
+        grid = np.linspace(-reach, reach, GRID)
+        near, step = grid[int(np.argmin([error(more) for more in grid]))], grid[1] - grid[0]
+        ends = near - step, near + step
+        best = minimize_scalar(
+            error, bounds=ends, method="bounded", options={"xatol": FINE * reach}
+        )
+        return at(float(best.x))
+
+    def pairs(self, known: Some, fitted: Some) -> Iterator[Some]:
+        """Two mistakes each, about other columns; with the zeros `fitted` to each alone where they
+        are about different legs."""
+        legs = [self._legs(m) for m in known]
+        for i, j in combinations(range(len(known)), 2):
+            apart = legs[i] and legs[j] and legs[i].isdisjoint(legs[j])
+            some = [fitted[i], fitted[j]] if apart else [known[i], known[j]]
+            if not known[i].about & known[j].about and not any(m.small or m.plain for m in some):
+                yield some
+
+    def _legs(self, mistake: MixUp) -> set[int]:
+        """Numbers of the legs that it is about; empty if it is about the body."""
+        whose, legs = {name.split("/")[0] for name in mistake.about}, self.physics.legs
+        return set() if "body" in whose else {legs.index(leg) for leg in whose}
 
     def is_effect(self, some: Some, least: float) -> bool:
         """Whether these mistakes are no more than effects: a fault that a sensor may have, or less
