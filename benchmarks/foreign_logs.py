@@ -4,6 +4,7 @@ python benchmarks/foreign_logs.py [COUNT] [FIRST SEED]: a table on the standard 
 full. Exit code 1 where a log was read wrong or crashed.
 """
 
+import shutil
 import sys
 import tempfile
 from collections import Counter
@@ -27,7 +28,7 @@ def main(count: int = 400, first: int = 0) -> int:
             if verdict.what != "read":
                 print(f"{verdict.what}: {found}: {verdict.why[:300]}")
             for file in Path(name).iterdir():
-                file.unlink()
+                shutil.rmtree(file) if file.is_dir() else file.unlink()
     kinds = ("read", "asked", "refused", "wrong", "crash")
     print("| written as | " + " | ".join(kinds) + " |\n|---" * 1 + "|---" * len(kinds) + "|")
     for form, counts in {**by_form, "all": verdicts}.items():

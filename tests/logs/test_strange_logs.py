@@ -35,6 +35,41 @@ def test_no_log_of_hundreds_is_read_wrong(tmp_path: Path) -> None:
     assert verdicts.count("read") >= 0.8 * len(verdicts)
 
 
+def test_blanks_in_dates_and_names_separate_nothing(tmp_path: Path) -> None:
+    """Here they happen to give as many names as cells."""
+    log = robot_log()
+    table = {n.replace("/", "_"): log[n] for n in log.names}
+    table |= {"imu_acc_x [m/s^2]": log.time, "imu_acc_z [m/s^2]": log.time}
+    seconds = pd.Timestamp("2025-12-19 12:30:54") + pd.to_timedelta(log.time, "s")
+    table["Date"] = seconds.strftime("%b %d, %Y %H:%M:%S.%f").to_numpy()
+    pd.DataFrame(table).to_csv(tmp_path / "log.tsv", index=False, sep="\t")
+    draft = draft_map(tmp_path / "log.tsv", ("front", "rear"), 0.07)
+    assert not draft.missing and not draft.questions
+    assert draft.columns["rear/piston/x [m]"]["source"] == "rear_piston_x"
+
+
+@pytest.mark.parametrize(
+    ("extra", "up"),
+    [
+        (("imu_acc_x [m/s^2]", "imu_acc_z [m/s^2]"), True),
+        (("front_foot_Fz [N]",), True),
+        (("acc_x", "acc_y", "acc_z"), False),
+        (("vy", "vz"), False),
+    ],
+)
+def test_a_z_of_another_kind_does_not_make_y_lateral(
+    extra: tuple[str, ...], up: bool, tmp_path: Path
+) -> None:
+    """Unless it stands beside a y of that kind: then y may be lateral, and a person is asked."""
+    log = robot_log()
+    table = {"t [s]": log.time, **{n.replace("/", "_"): log[n] for n in log.names}}
+    table |= {"x [m]": table.pop("body_x"), "y [m]": table.pop("body_z")}
+    table |= {name: np.sin(log.time) for name in extra}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    columns = draft_map(tmp_path / "log.csv", ("front", "rear"), 0.07).columns
+    assert (columns.get("body/z [m]", {}).get("source") == "y [m]") is up
+
+
 @pytest.mark.parametrize("where", ["name", "number", "end"])
 def test_a_stray_quote_is_told_at_its_line(where: str, tmp_path: Path) -> None:
     """Readers of CSV take all up to the next quote for one cell, of any length."""

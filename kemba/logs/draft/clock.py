@@ -160,7 +160,7 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
     question = ""
     if stated is None:
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
-        step = float(np.median(np.diff(seconds[np.isfinite(seconds)])))
+        step = float(np.median(np.diff(np.unique(seconds[np.isfinite(seconds)]))))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
         began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
         stamped = 6e8 < began < 4.1e9  # since 1970: between 1990 and 2100

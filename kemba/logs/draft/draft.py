@@ -55,7 +55,8 @@ def layout_of(path: Path) -> Layout:
     """Keys of a column map that say how to read the table; those with their default are left out.
 
     Of all separators and decimal signs that give about the most numbers, one that gives a name to
-    each column too, and then the one that gives most. Raises KembaError where none gives a table of
+    each column too, then one that is no blank, which stands in dates and names as well, and then
+    the one that gives most. Raises KembaError where none gives a table of
     at least two columns.
     """
     lines = _lines(path)
@@ -63,7 +64,11 @@ def layout_of(path: Path) -> Layout:
     most = max(score for (score, _, _), _ in found)
     (score, begin, width), (separator, decimal) = max(
         (way for way in found if way[0][0] >= NEARLY * most),
-        key=lambda way: (_header(lines[: way[0][1]], way[1][0], way[0][2])[1] > 0, way[0][0]),
+        key=lambda way: (
+            _header(lines[: way[0][1]], way[1][0], way[0][2])[1] > 0,
+            way[1][0] != "whitespace",
+            way[0][0],
+        ),
     )
     if not score or width < 2:
         expected = "rows of at least two numbers were expected"

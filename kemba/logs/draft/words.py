@@ -125,8 +125,19 @@ class Names:
 
     @cached_property
     def _spatial(self) -> bool:
+        """Whether there is a position along z, or y and z of another kind: an accelerometer's z
+        beside positions x and y tells nothing."""
         vertical = set(WORDS["direction"]["z"].split()) - {"height", "vertical", "altitude"}
-        return any(set(words(named_unit(name)[0])) & vertical for name in self.columns)
+        along_y, along_z = (
+            {
+                kind
+                for name in map(self.bare, self.columns)
+                if set(words(name)) & axis
+                for kind in meaning(name, self.legs).get("kind") or {"position"}
+            }
+            for axis in (set(WORDS["direction"]["y"].split()), vertical)
+        )
+        return bool(along_z & {"position", *along_y})
 
 
 def words(name: str) -> list[str]:

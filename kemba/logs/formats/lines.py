@@ -98,7 +98,7 @@ def _table(
 ) -> np.ndarray:
     """The numbers (n, width); an empty cell is no reading, and a comment after them is left out."""
     with suppress(ValueError):  # of whole rows; what is no number is told at its place below
-        whole = [line.replace(decimal, ".") for line in lines] if decimal != "." else lines
+        whole = (line.replace(decimal, ".") for line in lines) if decimal != "." else lines
         return np.loadtxt(whole, delimiter=separator, usecols=range(width), ndmin=2, comments=None)
     found = np.full((len(lines), width), np.nan)
     count = 0
