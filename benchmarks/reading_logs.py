@@ -10,6 +10,7 @@ Linux only: it tells the largest size.
 
 import argparse
 import json
+import struct
 import subprocess
 import sys
 import tempfile
@@ -51,6 +52,10 @@ LIBRARIES = {
     "ulg": (
         "import pyulog",
         "f = pyulog.ULog(p); d = f.data_list[0].data",
+    ),
+    "lvm": (
+        "import numpy",
+        "d = numpy.loadtxt(p, skiprows=10)",
     ),
     "mcap": (
         "import json, numpy; from mcap.reader import make_reader",
@@ -140,6 +145,42 @@ def _tdms(log: Table, path: Path) -> None:
         writer.write_segment(channels)
 
 
+def _ulg(log: Table, path: Path) -> None:
+    """By its specification: pyulog writes no arrays."""
+    names = [name for name in log if name != "time"]
+    fields = ";".join(["uint64_t timestamp", *(f"double {name}" for name in names)]) + ";"
+    texts = {"F": f"log:{fields}".encode(), "A": struct.pack("<BH", 0, 0) + b"log"}
+    head = b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    for kind, data in texts.items():
+        head += struct.pack("<HB", len(data), ord(kind)) + data
+    kind = np.dtype(
+        [
+            ("size", "<u2"),
+            ("kind", "u1"),
+            ("number", "<u2"),
+            ("t", "<u8"),
+            *((n, "<f8") for n in names),
+        ]
+    )
+    rows = np.zeros(len(log["time"]), kind)
+    rows["size"], rows["kind"] = kind.itemsize - 3, ord("D")
+    rows["t"] = np.round(1e6 * log["time"])
+    for name in names:
+        rows[name] = log[name]
+    path.write_bytes(head + rows.tobytes())
+
+
+def _lvm(log: Table, path: Path) -> None:
+    names = [name for name in log if name != "time"]
+    head = [
+        "LabVIEW Measurement", "Writer_Version\t2", "Separator\tTab", "Decimal_Separator\t.",
+        "***End_of_Header***", "", f"Channels\t{len(names)}", "Samples\t1",
+        "***End_of_Header***", "\t".join(["X_Value", *names]),
+    ]  # fmt: skip
+    text = "\n".join(head)
+    np.savetxt(path, np.column_stack(list(log.values())), "%.6f", "\t", header=text, comments="")
+
+
 def _mcap(log: Table, path: Path) -> None:
     from mcap.writer import Writer
 
@@ -177,7 +218,7 @@ def _sto(log: Table, path: Path) -> None:
 
 WRITERS: dict[str, Callable[[Table, Path], None]] = {
     "csv": _csv, "parquet": _parquet, "npz": _npz, "json": _json, "mat": _mat, "mf4": _mf4,
-    "tdms": _tdms, "mcap": _mcap, "bag": _bag, "sto": _sto,
+    "tdms": _tdms, "mcap": _mcap, "bag": _bag, "sto": _sto, "ulg": _ulg, "lvm": _lvm,
 }  # fmt: skip
 
 
