@@ -43,11 +43,9 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
         for some, trial in mix_ups(run, stroke)
         for more, left in _left(trial, predict).items()
     }
-    least = min(left for _, _, left in trials.values())
     small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
-    close = [t for t, (_, _, left) in trials.items() if left <= max(ALIKE * least, small)]
-    simple = [texts for texts in close if len(texts) == len(min(close, key=len))]
-    if simple != [()] and least < CLOSE and least * BETTER < as_read[()]:
+    simple = simplest({texts: left for texts, (_, _, left) in trials.items()}, small)
+    if simple:
         said = [" and ".join(texts) for texts in simple]
         if END in simple[0]:
             said[0] += _zero(*trials[simple[0]], stroke, predict)
@@ -65,6 +63,15 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
             )
         ]
     return []
+
+
+def simplest(trials: Left, small: float) -> list[Texts]:
+    """The fewest mistakes without which about the least is left, or as little as noise makes
+    (`small`); none where the log as it is, (), leaves hardly more."""
+    least = min(trials.values())
+    close = [texts for texts, left in trials.items() if left <= max(ALIKE * least, small)]
+    simple = [texts for texts in close if len(texts) == len(min(close, key=len))]
+    return simple if () not in simple and least < CLOSE and least * BETTER < trials[()] else []
 
 
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:

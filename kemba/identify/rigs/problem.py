@@ -13,6 +13,8 @@ from typing_extensions import Self
 
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
+from kemba.identify.infer.windows import rms
+from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
     CandidateSettings,
     by_default,
@@ -35,6 +37,7 @@ from kemba.identify.problem.types import (
 )
 from kemba.identify.rigs.prediction import Predictor
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog, prepare
+from kemba.identify.rigs.validate import contradictions
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -324,6 +327,19 @@ class RigProblem(ColouredProblem):
         """Measured less predicted force (n,)."""
         gaps = [-self.predictor.gap(log, theta) for log in self.logs]
         return {self.answer: np.concatenate(gaps)}
+
+    def validate(self) -> list[str]:
+        """Raises BadData where columns must be mixed up."""
+        faults = [
+            fault
+            for log, sigma in zip(self.logs, self._sigma, strict=True)
+            for fault in contradictions(
+                log, self.model, rms(sigma), lambda trial: self.predictor.gap(trial, {})
+            )
+        ]
+        if faults:
+            raise BadData(faults)
+        return []
 
     def way(self) -> tuple[Array, Flags]:
         """Position (n,) of every row, and whether it moves forward (n,)."""

@@ -111,6 +111,56 @@ MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
 }
 
 
+# a sign and a zero: their own columns, and words of the advice about each
+MOVED: dict[str, tuple[dict[str, Change], str]] = {
+    "a hip": ({"rear__hip__q": lambda q: 0.3 - q}, "hip/q of the rear leg has the reversed sign"),
+    "both hips": ({"hip__q": lambda q: 0.3 - q}, "hip/q of every leg has the reversed sign"),
+    "each hip": (
+        {"rear__hip__q": lambda q: 0.3 - q, "front__hip__q": lambda q: -0.25 - q},
+        "hip/q of the front leg has .* and hip/q of the rear leg has the reversed sign",
+    ),
+    "both zeros": (
+        {"rear__hip__q": lambda q: 0.3 + q, "front__hip__q": lambda q: -0.25 + q},
+        "hip/q of the front leg counts .* and hip/q of the rear leg counts from another zero",
+    ),
+    "the pitch": ({"pitch": lambda p: 0.1 - p}, "body/pitch has the reversed sign"),
+    "a piston": ({"front__piston__x": lambda x: 0.076 - x}, "piston/x of the front leg counts"),
+    "pistons": ({"piston__x": lambda x: 0.076 - x}, "piston/x of every leg counts"),
+    "a hip, a piston": (
+        {"rear__hip__q": lambda q: 0.3 - q, "front__piston__x": lambda x: 0.076 - x},
+        "piston/x of the front leg counts .* and hip/q of the rear leg has the reversed sign",
+    ),
+}
+
+
+def put_right(log: ResampledLog, physics: Physics, said: str) -> ResampledLog:
+    """A log as the first advice says that it is to be read."""
+    changes: dict[str, Change] = {}
+    advice = (
+        r"(\S+?/\S+)(?: of (?:the )?(\w+) leg)? [^`()]*\((?:`sign: (-1), offset: )?(\S+) (mm|deg)"
+    )
+    for name, leg, turned, number, unit in re.findall(advice, said.split("; or ")[0]):
+        zero = float(number) * (1e-3 if unit == "mm" else np.pi / 180)
+        sign, offset = (-1, zero) if turned else (1, -zero)  # `too much` is taken away
+        key = f"{leg}/{name}" if leg not in ("", "every") else name
+        changes[key] = lambda x, sign=sign, offset=offset: sign * x + offset
+    assert changes, said
+    return changed(log, physics, **changes)
+
+
+@pytest.mark.parametrize("mistake", MOVED)
+def test_a_sign_and_a_zero_are_named_and_the_advice_once_followed_leaves_millimetres(
+    mistake: str, physics: Physics, standing: ResampledLog
+) -> None:
+    changes, words = MOVED[mistake]
+    (fault,) = found(physics, changed(standing, physics, **changes))
+    assert re.search(rf"stand: (.* and )?{words}", str(fault)), str(fault)
+    right = put_right(changed(standing, physics, **changes), physics, str(fault))
+    assert not found(physics, right)
+    assert np.abs(right.y[:, 2:5] - standing.y[:, 2:5]).max() < 0.02  # rad
+    assert np.abs(right.y[:, 5:] - standing.y[:, 5:]).max() < 1.5e-3  # m
+
+
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_is_named(mistake: str, physics: Physics, standing: ResampledLog) -> None:
     changes, words = MISTAKES[mistake]

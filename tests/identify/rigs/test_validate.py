@@ -1,0 +1,73 @@
+"""Mistakes in the columns of a drive's log and a cylinder's: signs, ends, zeros."""
+
+import re
+
+import numpy as np
+import pytest
+
+from kemba.identify.logs.gate import BadData
+from kemba.identify.rigs.problem import rig_problem
+from kemba.model.spec import load_model
+from kemba.trajectory import Trajectory
+
+TIME = np.arange(0.0, 4.0, 2e-3)
+Q = 0.8 * np.sin(2.1 * TIME) + 0.3 * np.sin(5.3 * TIME)
+V, A = np.gradient(Q, TIME), np.gradient(np.gradient(Q, TIME), TIME)
+FORCE = (0.02 + 1.5 * 0.25**2) * A + 1.5 * 0.25 * 9.81 * np.sin(Q) + 0.4 * np.tanh(V / 0.01)
+
+
+def pendulum(q: np.ndarray, tau: np.ndarray) -> Trajectory:
+    noise = np.random.default_rng(0).standard_normal((2, len(TIME)))
+    columns = {"axis/q [rad]": q + 1e-4 * noise[0], "axis/tau [N.m]": tau + 0.05 * noise[1]}
+    return Trajectory(TIME, columns, {"kind": "drive", "name": "run"})
+
+
+@pytest.mark.parametrize(
+    ("sign", "turned", "zero", "words"),
+    [
+        (1, -1, 0.0, "run: axis/tau has the reversed sign; or axis/q has the reversed sign; the"),
+        (-1, 1, 0.0, "run: axis/tau has the reversed sign; or axis/q has the reversed sign; the"),
+        (1, 1, 1.2, r"run: axis/q counts from another zero \(`offset: -68\.\d deg`\); the"),
+        (-1, 1, 0.6, r"axis/q has the reversed sign and axis/q counts .*`offset: \+34\.\d deg`"),
+    ],
+)
+def test_a_mistake_is_named_and_once_followed_nothing_is_left(
+    sign: int, turned: int, zero: float, words: str
+) -> None:
+    """A pendulum seen from its other side is the same: both signs are named."""
+    model, log = load_model("pendulum_rig"), pendulum(sign * Q + zero, turned * FORCE)
+    with pytest.raises(BadData) as raised:
+        rig_problem([log], model).validate()
+    assert re.search(words, str(raised.value)), str(raised.value)
+    first = str(raised.value).split("; or ")[-1 if sign < 0 else 0]
+    offset = re.search(r"offset: (\S+) deg", first)
+    q = (-1 if "axis/q has the reversed" in first else 1) * log["axis/q"]
+    q = q + (np.radians(float(offset[1])) if offset else 0.0)
+    tau = (-1 if "axis/tau has the reversed" in first else 1) * log["axis/tau"]
+    right = rig_problem([pendulum(q, tau)], model)
+    assert right.validate() == []
+    assert np.sqrt(np.mean(right.residual({}) ** 2)) < 2.0  # of the noise
+
+
+def test_a_cylinder() -> None:
+    """The force alone tells its sign; where it does not hang on the position, the end is open."""
+    pressure = 3e5 + 1e5 * np.sin(3.0 * TIME)
+    force = (pressure - 101325.0) * np.pi / 4 * 0.025**2
+    x = 0.02 + 0.01 * np.sin(1.3 * TIME)
+    noise = np.random.default_rng(0).standard_normal((3, len(TIME)))
+    columns = {"piston/x [m]": x + 1e-6 * noise[0], "chamber/extend/P [Pa]": pressure + noise[1]}
+    model = load_model("cylinder_rig")
+    for sign in (1, -1):
+        columns["piston/F [N]"] = sign * (force + 0.05 * noise[2])
+        problem = rig_problem([Trajectory(TIME, dict(columns), {"kind": "cylinder"})], model)
+        if sign > 0:
+            assert problem.validate() == []
+        else:
+            with pytest.raises(BadData, match=r"piston/F has the reversed sign .*; the force"):
+                problem.validate()
+
+
+def test_friction_and_small_zeros_are_no_mistakes() -> None:
+    """These are for `discover` to find."""
+    log = pendulum(Q + 0.1, FORCE + 1.5 * np.tanh(V / 0.01))
+    assert rig_problem([log], load_model("pendulum_rig")).validate() == []
