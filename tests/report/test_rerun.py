@@ -45,3 +45,15 @@ def test_robot_plan_and_columns_are_in_a_recording(tmp_path: Path) -> None:
     for name in log.names:
         assert rows[f"/log/{name}"] == np.isfinite(log[name]).sum(), name
         assert rows[f"/plan/{name}"] == len(plan), name
+    layout = {
+        c.entity_path: c.to_record_batch() for c in reader.stream(store=reader.blueprints()[0])
+    }
+    title, query = "ViewBlueprint:display_name", "ViewContents:query"
+    views = {
+        part[title][0].as_py()[0]: layout[f"{place}/ViewContents"][query][0].as_py()
+        for place, part in layout.items()
+        if title in part.schema.names
+    }
+    assert views.pop("robot") == ["$origin/**"]
+    plotted = {name for contents in views.values() for name in contents}
+    assert {f"+ /{whose}/{n}" for whose in ("log", "plan") for n in log.names} == plotted

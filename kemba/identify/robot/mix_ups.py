@@ -144,8 +144,9 @@ def _changed(y: Columns, some: Some) -> dict[str, Any]:
 
 def _number(value: float, unit: str) -> str:
     """A zero [rad or m] in words."""
-    shown, word = (1e3 * value, "mm") if unit == "m" else (np.degrees(value), "degrees")
-    return f"{round(shown, 0 if word == 'mm' and abs(shown) >= 10 else 1):+g} {word}"
+    if unit == "m":
+        return f"{1e3 * value:+.{0 if abs(value) >= 0.01 else 1}f} mm"
+    return f"{round(np.degrees(value), 1):+g} degrees"
 
 
 TURNED = "body/pitch has the reversed sign (nose up is positive)"
