@@ -51,8 +51,8 @@ CONSTANTS = {  # file -> names, why
     ),
     "plant/controller.py": ("PERIOD", "rate of the robot's controller"),
     "ocp/mpcc/solve.py": (
-        "PATHS FACTOR OFF LONG BRANCH SCALED TRIED MARGIN SWITCHES PAYS SLOPE COMPARED WORTH RESIDUAL "
-        "STEP LONGEST",
+        "PATHS FACTOR OFF LONG BRANCH SCALED TRIED MARGIN SWITCHES PAYS SLOPE COMPARED WORTH "
+        "RESIDUAL STEP LONGEST",
         "figures of a general method, chosen on NOSBENCH (benchmarks/pages/nosbench.md)",
     ),
     "ocp/nlp/ending.py": ("USUAL", "iterations of which a median is taken"),

@@ -180,7 +180,7 @@ class Ground:
         for aside in np.linspace(-0.1, 0.1, 101) if self.level is None else ():
             way = np.hypot(aside, np.maximum(self.height(x + aside) - z, 0.0))
             below = np.minimum(below, way)
-        return below
+        return np.asarray(below)
 
     def friction(self, x: Any, usual: Any) -> Any:
         """Friction coefficient at x, `usual` where no line says one."""
