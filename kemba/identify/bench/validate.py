@@ -38,9 +38,11 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
     as_read, force = _left(run, predict), run.measured["piston/F"][run.keep["piston/F"]]
     if not as_read or as_read[()] < (small := SMALL * run.sigma["piston/F"] / _spread(force)):
         return []
-    trials = {
+    trials = {more: (run, more, left) for more, left in as_read.items()}
+    trials |= {
         some + more: (trial, more, left)
         for some, trial in mix_ups(run, stroke)
+        if some
         for more, left in _left(trial, predict).items()
     }
     small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
@@ -110,7 +112,7 @@ def _left(run: BenchLog, predict: Predict) -> Left:
             if sign < 0.0:
                 moved = f"`sign: -1, offset: {np.mean(gap):+.3g} N`"
                 zero = (*texts, f"piston/F counts from another zero ({moved})")
-                found[zero] = float(np.std(gap)) / spread
+                found[zero] = float(np.std(gap)) / max(factor * float(np.std(force)), 1.0)
     return {texts: left for texts, left in found.items() if np.isfinite(left)}
 
 
