@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from kemba.errors import enumerated
 from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
-from kemba.ocp.certificate.certify import Certificate, certify, costs, objective
+from kemba.ocp.certificate.certify import Certificate, certify, costs, gains, objective
 from kemba.ocp.certificate.status import Status, verdict
 from kemba.ocp.infeasibility.diagnostic import Relax
 from kemba.ocp.infeasibility.explain import Explanation
@@ -148,13 +149,17 @@ def sentence_of(plan: Plan) -> str:
 
 
 def warnings(plan: Plan) -> list[str]:
-    """What a task that was met may not have meant."""
+    """What a task that was met may not have meant; of several goals that are to be large or small,
+    what each weighs beside the others."""
+    traded = gains(plan.requirements, plan.trajectory)
+    weighs = enumerated([f"{name} by {gain:.3g}" for name, gain in traded.items()])
+    found = [f"goals lower the cost [N2.m2.s]: {weighs}"] if len(traded) > 1 else []
     rests = any(r.location == ("end", "rest") for r in plan.requirements)
     heights = [gap[-1] for gap in feet(plan.trajectory).values()]
     if not rests or not heights or min(heights) <= GROUND:
-        return []
+        return found
     hint = 'a robot in the air falls; ask for `"*/foot/gap": 0 m` at the end'
-    return [f"the motion ends at rest with no foot on the ground: {hint}"]
+    return [*found, f"the motion ends at rest with no foot on the ground: {hint}"]
 
 
 TAKEN = ("solve_s", "solve_cpu_s", "build_s", "iterations", "variables", "constraints")

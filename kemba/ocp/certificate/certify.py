@@ -236,11 +236,17 @@ def objective(
     model: Model, task: Task, requirements: Sequence[Requirement], plan: Trajectory
 ) -> float:
     """Weighted costs of a plan, less what is gained by quantities that are to be large or small."""
-    total = integral(task.cost, model, plan)
-    for asked in (r for r in requirements if r.aim and r.at is not None):
-        value = float(plan[asked.quantity.name][asked.node(len(plan) - 1)])
-        total -= COST_SCALE * AIM * asked.aim * value / asked.scale
-    return total
+    return integral(task.cost, model, plan) - sum(gains(requirements, plan).values())
+
+
+def gains(requirements: Sequence[Requirement], plan: Trajectory) -> dict[str, float]:
+    """By how much [N2.m2.s] the cost is lower for each quantity that is to be large or small, by
+    the name of its goal and its own."""
+    found = {}
+    for r in (r for r in requirements if r.aim and r.at is not None):
+        value = float(plan[r.quantity.name][r.node(len(plan) - 1)])
+        found[f"{r.location[1]} ({r.quantity.name})"] = COST_SCALE * AIM * r.aim * value / r.scale
+    return found
 
 
 def costs(model: Model, plan: Trajectory) -> dict[str, float]:
