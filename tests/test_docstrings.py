@@ -20,7 +20,7 @@ ARRAY = re.compile(r"\b(Array|ndarray|Flags|Labels)\b")
 SHAPE = re.compile(r"\([^()]*,[^()]*\)|\((n|m|k)\)|\[\w")  # (n, 3), (n,), (n) or `values[i]`
 RAISES = re.compile(r"\b[Rr]aises?\b")
 UNIT = r"(?:in|of|\[)\s?(?:s|m|Pa|N|N\.m|rad|kg)\b|violations and products"  # behind a name
-PAGE = ROOT.parent / "docs" / "library.md"
+PAGE = Path(__file__).parents[1] / "docs" / "library.md"
 
 
 @dataclass(frozen=True)
