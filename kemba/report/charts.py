@@ -134,7 +134,7 @@ class Book:
 
     def add(self, *charts: Chart) -> str:
         """The charts below each other as one figure; empty where none has anything to show."""
-        shown = [c for c in charts if c.rows or any(np.isfinite(x.values).any() for x in c.lines)]
+        shown = [chart for chart in charts if _filled(chart)]
         if not shown:
             return ""
         cells = []
@@ -200,6 +200,10 @@ def in_words(chart: Chart, grid: Array, tracks: Sequence[Track]) -> str:
             when = ", ".join(f"{a:.3f} to {b:.3f} s" for a, b in spans) or "never"
             parts.append(f"{label}, {tracks[track].name}: {when}")
     return f"{chart.title}: " + "; ".join(parts)
+
+
+def _filled(chart: Chart) -> bool:
+    return bool(chart.rows) or any(np.isfinite(line.values).any() for line in chart.lines)
 
 
 def _plain(chart: Chart) -> dict[str, Any]:

@@ -136,9 +136,8 @@ def strangers(run: Run, logs: Sequence[Trajectory]) -> list[Stranger]:
     if not (run.path / "controller.csv").is_file():
         return []
     found = []
-    late = (
-        1e-3 * LATEST if (run.path / POLICY).is_file() else 0.0
-    )  # s: feedback may move an edge so
+    # by how much [s] feedback may move an edge
+    late = 1e-3 * LATEST if (run.path / POLICY).is_file() else 0.0
     for log in logs:
         name, made_of = str(log.meta.get("name", "the log")), str(log.meta.get("repeat_of", ""))
         share = other_commands(log, run.controller, late)

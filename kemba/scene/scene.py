@@ -316,10 +316,7 @@ class Scene(Section):
 
     def faults(self) -> Iterator[tuple[Location, str]]:
         """What cannot be, and where: lines of terrain or obstacles that overlap."""
-        for kind, told in (
-            ("height", _shaping),
-            ("friction", lambda line: line.friction is not None),
-        ):
+        for kind, told in (("height", _shaping), ("friction", _gripping)):
             begun: list[tuple[float, int]] = []
             for i, line in enumerate(self.terrain):
                 if not told(line):
@@ -355,6 +352,10 @@ def scene_in(meta: Mapping[str, Any], where: str = "") -> Scene:
 
 def _shaping(line: Terrain) -> bool:
     return type(line) is not Terrain
+
+
+def _gripping(line: Terrain) -> bool:
+    return line.friction is not None
 
 
 def _overlap(kind: str, line: Terrain, other: int) -> str:

@@ -115,25 +115,24 @@ def _listed(file: Path, tell: Tell) -> Iterator[Remembered]:
         return
     damaged = 0
     for line in lines:
-        try:
-            entry = json.loads(line)
-            figures = {str(key): float(value) for key, value in entry["figures"].items()}
-            one = Remembered(str(entry["kind"]), figures, float(entry["cost"]), str(entry["run"]))
-            good = all(map(math.isfinite, (one.cost, *figures.values())))
-        except (
-            ArithmeticError,
-            AttributeError,
-            LookupError,
-            RecursionError,
-            TypeError,
-            ValueError,
-        ):
-            good = False
-        if good:
+        one = _entry(line)
+        if one is None:
+            damaged += 1
+        else:
             yield one
-        damaged += not good
     if damaged:
         tell(f"{damaged} entries of {file} cannot be read and are left out")
+
+
+def _entry(line: str) -> Remembered | None:
+    """A line of the list; None where it is damaged."""
+    try:
+        entry = json.loads(line)
+        figures = {str(key): float(value) for key, value in entry["figures"].items()}
+        one = Remembered(str(entry["kind"]), figures, float(entry["cost"]), str(entry["run"]))
+    except (ValueError, ArithmeticError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+    return one if all(map(math.isfinite, (one.cost, *figures.values()))) else None
 
 
 # Numbers by which tasks of one kind differ.

@@ -1,9 +1,7 @@
-"""Motions known from the books: a throw over a box, a jump from a piston, a hopper, a wall."""
-
-import math
+"""Motions known from the books: a throw over a box, a jump from a piston, a hopper."""
 
 import pytest
-from ocp.toys import Leg, Push, Stroke, Wall, bead, solve
+from ocp.toys import Leg, Stroke, bead, solve
 
 from kemba.scene.scene import EDGE, Obstacle
 
@@ -74,22 +72,3 @@ def test_a_hopper_pushes_evenly() -> None:
     force = program.layout.full(point.Y, "u")[1:, 0]
     assert force[:20] == pytest.approx(G / stance, rel=1e-6)
     assert force @ force * stride / 40 == pytest.approx(G**2 * stride / stance, rel=1e-6)
-
-
-def test_the_least_time_to_a_wall() -> None:
-    """No need to brake where a wall stops: sqrt(2 d / a) instead of 2 sqrt(d / a)."""
-    errors = []
-    for nodes in (20, 40):
-        program, point = solve(
-            bead(),
-            [Push(), Wall()],
-            {"body/x": 0.0, "body/vx": 0.0},
-            end={"body/x": 1.0, "body/vx": 0.0},
-            duration=2.0,
-            nodes=nodes,
-            step_variation=0.5,
-            cost={"duration": 1.0},
-        )
-        errors.append(float(program.times(point.Y)[-1]) - math.sqrt(2.0))
-    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.3)
-    assert errors[1] < 0.003

@@ -4,15 +4,17 @@ import math
 
 import numpy as np
 import pytest
-from ocp.toys import Push, Wire, bead, solve
+from ocp.toys import Push, Wall, Wire, bead, solve
 from scipy.optimize import brentq
 
+from kemba.effects.base import Effect
 
-def minimum_time(nodes: int) -> tuple[float, float, np.ndarray]:
+
+def minimum_time(nodes: int, *others: Effect) -> tuple[float, float, np.ndarray]:
     """Duration, switching time and forces of the quickest rest-to-rest metre."""
     program, point = solve(
         bead(),
-        [Push()],
+        [Push(), *others],
         {"body/x": 0.0, "body/vx": 0.0},
         end={"body/x": 1.0, "body/vx": 0.0},
         duration=2.2,
@@ -36,6 +38,13 @@ def test_minimum_time_double_integrator() -> None:
     for force in forces:
         assert np.count_nonzero(np.abs(np.abs(force) - 1.0) > 1e-4) <= 1, "bang-bang, one switch"
         assert np.count_nonzero(np.diff(np.sign(force))) == 1
+
+
+def test_the_least_time_to_a_wall() -> None:
+    """No need to brake where a wall stops: T = sqrt(2 d / a) instead of 2 sqrt(d / a)."""
+    errors = [minimum_time(nodes, Wall())[0] - math.sqrt(2.0) for nodes in (20, 40)]
+    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.3)
+    assert errors[1] < 0.003
 
 
 def brachistochrone(nodes: int) -> tuple[float, float]:

@@ -27,6 +27,12 @@ def pulses(time: Array, command: Array) -> list[Pulse]:
     return list(zip(starts, ends, strict=True))
 
 
+def inverted(sent: Iterable[Pulse]) -> list[Pulse]:
+    """Pulses of a valve that is on where it was off."""
+    edges = [-np.inf, *(t for pulse in sent for t in pulse), np.inf]
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if a < b]
+
+
 def delayed(sent: Iterable[Pulse], on: float, off: float) -> Array:
     """Pulses (k, 2) of a valve that opens `on` and closes `off` [s] after the command.
 

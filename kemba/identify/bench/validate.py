@@ -8,9 +8,10 @@ from itertools import product
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from kemba.effects.pneumatics.switching import Pulse
+from kemba.effects.pneumatics.switching import Pulse, inverted
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
@@ -28,6 +29,8 @@ MORE_ALIKE = 1.5  # factor by which a lag must raise the correlation
 
 UNITS = {"": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482, "kgf": 9.81}  # [N]
 END = "piston/x counts from the extended end (0 is retracted)"
+SWAPPED = "valve/extend and valve/retract are swapped"
+INVERTED = "valve/extend and valve/retract are inverted (1 is on)"
 REVERSED = "piston/F has the reversed sign (pushing is positive)"
 Texts = tuple[str, ...]  # mistakes
 Left = dict[Texts, float]  # the share of the force's spread that is left without them
@@ -79,16 +82,14 @@ def simplest(trials: Left, small: float) -> list[Texts]:
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
     """What may be wrong with valves and position, and the log with that put right."""
     extend, retract = run.commands
-    off, out = _inverted(extend), _inverted(retract)
-    swapped, both = "valve/extend and valve/retract are swapped", "(1 is on)"
-    inverted = f"valve/extend and valve/retract are inverted {both}"
+    off, out = inverted(extend), inverted(retract)
     valves: list[tuple[Texts, tuple[list[Pulse], list[Pulse]]]] = [
         ((), run.commands),
-        ((swapped,), (retract, extend)),
-        ((inverted,), (off, out)),
-        ((swapped, inverted), (out, off)),
-        ((f"valve/extend is inverted {both}",), (off, retract)),
-        ((f"valve/retract is inverted {both}",), (extend, out)),
+        ((SWAPPED,), (retract, extend)),
+        ((INVERTED,), (off, out)),
+        ((SWAPPED, INVERTED), (out, off)),
+        (("valve/extend is inverted (1 is on)",), (off, retract)),
+        (("valve/retract is inverted (1 is on)",), (extend, out)),
     ]
     motion = run.motion
     turned = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
@@ -108,7 +109,7 @@ def _left(run: BenchLog, predict: Predict) -> Left:
         for sign, (unit, factor) in product((1.0, -1.0), UNITS.items()):
             texts = (REVERSED,) * (sign < 0.0) + (f"piston/F seems to be in {unit}",) * bool(unit)
             gap, spread = predicted - sign * factor * force, _spread(factor * force)
-            found[texts] = float(np.sqrt(np.mean(gap**2))) / spread
+            found[texts] = rms(gap) / spread
             if sign < 0.0:
                 moved = f"`sign: -1, offset: {np.mean(gap):+.3g} N`"
                 zero = (*texts, f"piston/F counts from another zero ({moved})")
@@ -117,8 +118,8 @@ def _left(run: BenchLog, predict: Predict) -> Left:
 
 
 def _spread(force: Array) -> float:
-    """Spread [N] of a force (n,), at least 1 N."""
-    return max(float(np.std(force)), float(np.sqrt(np.mean(force**2))), 1.0)
+    """Size [N] of a force (n,), at least 1 N."""
+    return max(rms(force), 1.0)
 
 
 def _zero(run: BenchLog, texts: Texts, left: float, stroke: float, predict: Predict) -> str:
@@ -171,9 +172,3 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
             "correct it with `delay` in a column map",
         )
     ]
-
-
-def _inverted(intervals: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    edges = [-np.inf, *(e for pair in intervals for e in pair), np.inf]
-    pairs = zip(edges[::2], edges[1::2], strict=True)
-    return [(a, b) for a, b in pairs if b > a]

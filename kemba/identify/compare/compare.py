@@ -182,6 +182,10 @@ def _channels(
         )
 
 
+def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
+    return [hint for hint in hints if hint.kind == kind][:1]
+
+
 def phrase(found: Comparison) -> str:
     """The answer in plain words."""
     ratio = f"{short(found.noise_ratio)} times the noise"
@@ -198,8 +202,7 @@ def phrase(found: Comparison) -> str:
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
             f"as is usual, and then it would be {short(found.tolerant_ratio)} times."
         )
-    kinds = ("law", "command", "conflict")
-    hints = [h for kind in kinds for h in [x for x in found.hints if x.kind == kind][:1]]
+    hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
     parts = [
         f"The model {found.grade} the logs: its error is {ratio}",
         worst,

@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 
 from kemba.errors import KembaError
 from kemba.identify.bench.validate import END, REVERSED, SMALL, Texts, simplest
+from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
@@ -21,12 +22,12 @@ ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
 def contradictions(log: RigLog, model: Model, sigma: float, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` of the gap."""
     force = log.channels.others[ANSWER[model.mechanism.rig]][log.channels.rows]
-    spread = max(float(np.std(force)), float(np.sqrt(np.mean(force**2))))
+    size = rms(force)
 
     def left(trial: RigLog) -> float:
-        return float(np.sqrt(np.mean(gap(trial) ** 2))) / spread
+        return rms(gap(trial)) / size
 
-    small = SMALL * sigma / spread
+    small = SMALL * sigma / size
     if left(log) < small:
         return []
     trials = {texts: left(trial) for texts, trial in mix_ups(log, model, left)}

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 from scipy.optimize import minimize_scalar
 
-from kemba.effects.pneumatics.switching import Pulse
+from kemba.effects.pneumatics.switching import inverted
 from kemba.effects.sensors import SensorBias, SensorScale
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
@@ -221,10 +221,10 @@ def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
         yield _each(f"hip/tau of {whose} has the reversed sign", hips, np.negative)
         both = "valve/extend and valve/retract are"
         yield _swap(f"{both} swapped at {whose}", *pairs)
-        yield _each(f"{both} inverted (1 is on) at {whose}", valves, _inverted)
+        yield _each(f"{both} inverted (1 is on) at {whose}", valves, inverted)
         for side in sides:
             one = [f"{leg}/valve/{side}" for leg in some]
-            yield _each(f"valve/{side} is inverted (1 is on) at {whose}", one, _inverted)
+            yield _each(f"valve/{side} is inverted (1 is on) at {whose}", one, inverted)
     if len(legs) == 2:
         crossed = {x: (f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in
                    ("hip/tau", *(f"valve/{side}" for side in sides))}  # fmt: skip
@@ -238,12 +238,6 @@ def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:
     """Every leg, and each."""
     every = [("every leg", list(legs))] if len(legs) > 1 else []
     return [*every, *((f"the {leg} leg", [leg]) for leg in legs)]
-
-
-def _inverted(sent: Sequence[Pulse]) -> list[Pulse]:
-    """Pulses of a valve that is on where it was off."""
-    edges = [-np.inf, *(t for pulse in sent for t in pulse), np.inf]
-    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if a < b]
 
 
 def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixUp:

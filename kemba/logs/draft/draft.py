@@ -106,13 +106,17 @@ def _numbers(lines: list[str], separator: str, decimal: str) -> tuple[int, int, 
     for number, line in enumerate(lines):
         if line.strip():
             cells = cells_of(line, separator)
-            rows.append((number, len(cells), sum(map(bool, map(NUMBER[decimal].fullmatch, cells)))))
+            rows.append((number, len(cells), _count(cells, decimal)))
     numeric = [(number, width, count) for number, width, count in rows if count >= 2]
     if not numeric:
         return 0, 0, 0
     width = Counter(width for _, width, _ in numeric).most_common(1)[0][0]
     table = [(number, count) for number, other, count in numeric if other == width]
     return sum(count for _, count in table), table[0][0], width
+
+
+def _count(cells: Iterable[str], decimal: str) -> int:
+    return sum(bool(NUMBER[decimal].fullmatch(cell)) for cell in cells)
 
 
 def _header(above: list[str], separator: str, width: int) -> tuple[int, int]:

@@ -136,9 +136,9 @@ def _quiet() -> Iterator[None]:
         os.close(nothing)
 
 
-PATHS = {"adaptive": (1.0, 0.01), "monotone": (100.0, 0.1)}
 # barriers, which lead to different local minima; the first relaxation, in units of the products;
 # the tolerance of a relaxed program, of its relaxation (of its square below one)
+PATHS = {"adaptive": (1.0, 0.01), "monotone": (100.0, 0.1)}
 FACTOR = 0.1  # from one relaxation to the next
 OFF = 1e-2  # distance of a warm start from bounds, of relaxations above
 LONG, BRANCH = 500, 150  # iterations of a relaxed program and of a branch
@@ -299,7 +299,7 @@ Found = tuple[Iterate, OnBranch | None]
 def _along(solves: Solves, barrier: str, best: Found, tolerance: float) -> Found:
     """The cheaper of `best` and the first feasible point on a path from loose to tight pairs.
 
-    The path ends where its relaxed cost, which tighter pairs only raise, is not below the best
+    The path ends where its relaxed cost, which tighter pairs raise as a rule, is not below the best
     one, and at a point that violates least and still violates: tighter pairs would not mend it.
     """
     program, point = solves.program, Iterate(solves.program.start)
