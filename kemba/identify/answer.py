@@ -116,7 +116,9 @@ class Answer:
             f"{named} raise the quoted error from {self.error_before:.2f} to {self.error_after:.2f}"
         )
         self.remarks = [f"{raised}: no model is written", *self.remarks]
-        self.verdict = "unknown" if self.added else self.verdict
+        if self.added:
+            whole = self.error_before <= VerdictSettings.whole
+            self.verdict = "nothing" if whole else "unknown"
         self.added, self.sure, self.covariance = (), (), None
         self.figures, self.machine = {}, {}
         self.error_after = self.error_before

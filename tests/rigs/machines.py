@@ -26,9 +26,10 @@ def drive_log(
     seed: int = 0,
     seconds: float = 8.0,
     scale: float = 1.0,
+    width: float = 1e-4,
 ) -> Path:
     """An axis that follows sines under a PD controller; `weight` hangs: torque -weight sin q. The
-    motor does `scale` times what the log says."""
+    motor does `scale` times what the log says; friction turns over within a rate of `width`."""
     rng = np.random.default_rng(seed)
     rates, sizes = 2 * np.pi * np.array([0.4, 0.9, 1.7]), np.array([0.10, 0.05, 0.02])
     phases = rng.uniform(0, 2 * np.pi, 3)
@@ -40,7 +41,7 @@ def drive_log(
 
     def motion(t: float, y: np.ndarray) -> list[float]:
         q, v = y
-        force = motor(t, q, v) - coulomb * np.sign(v) * min(1.0, abs(v) / 1e-4)
+        force = motor(t, q, v) - coulomb * np.sign(v) * min(1.0, abs(v) / width)
         return [v, (force - viscous * v - weight * np.sin(q)) / inertia]
 
     time = np.arange(0.0, seconds, 2e-3)

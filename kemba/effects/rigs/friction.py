@@ -15,13 +15,14 @@ class AxisFriction(AxisEffect):
     """Coulomb friction of bearings, screw and guides."""
 
     F_c: Annotated[float, Param("N", 10.0, lower=0.0, doc="Coulomb force", rotary="N.m")] = 0.0
+    w: Annotated[float, Param("1", lower=0.01, doc="how smoothly it turns over")] = 1.0
 
-    equation = "-F_c tanh(v/sign_speed)"
+    equation = "-F_c tanh(v/(w sign_speed))"
     source = SURVEY
     dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"axis": coulomb(self.F_c, at.axis.v, at.sign_speed)})
+        return Contribution(effort={"axis": coulomb(self.F_c, at.axis.v, self.w * at.sign_speed)})
 
 
 class AxisDamping(AxisEffect):

@@ -83,7 +83,8 @@ class RigFit:
 
 def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
-    without a value start at their usual size. Raises KembaError where logs cannot tell them apart.
+    without a value start at their usual size; a shape that these logs cannot tell stays as it is.
+    Raises KembaError where logs cannot tell figures apart.
     """
     started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
     names = [
@@ -98,6 +99,13 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]
     problem: Problem = make(logs, started, dict.fromkeys(names, LOOSE))
+    seen = (
+        np.linalg.norm(problem.jacobian({}, names), axis=0) > 1.0
+    )  # 1 sigma below the value itself
+    shapes = {
+        f"{e.name}.{n}" for e in started.effects if e.off for n in e.parameters().keys() - e.off
+    }
+    names = [n for n, shows in zip(names, seen, strict=True) if shows or n not in shapes]
     before: Problem = make(logs, model)
     values = {n: float(started.effect(n.rsplit(".", 1)[0]).value(n.rsplit(".", 1)[1]))
               for n in names}  # fmt: skip

@@ -30,44 +30,43 @@ class Balance:
         force = node.dynamics[0] + node.u[0] if drive else node.outputs["piston/F"]
         symbols = [node.s, node.q, node.v, node.a, node.u, node.p]
         slopes = ca.horzcat(ca.jacobian(force, node.a), ca.jacobian(force, node.u))
-        self._force = ca.Function("force", symbols, [ca.densify(force)])
         self._slopes = ca.Function("slopes", symbols, [ca.densify(slopes.T)])
-        at_rest = ca.substitute(force, ca.vertcat(node.v, node.a), ca.DM.zeros(2))
-        bends = ca.which_depends(at_rest, node.q, 2, True)[0]
-        self._bends = bool(bends)
-        self._static = ca.Function("static", symbols, [ca.densify(at_rest)])
+        moving = ca.vertcat(node.s, node.v)
+        standing = ca.substitute(force, moving, ca.DM.zeros(moving.shape))
+        static = ca.substitute(standing, node.a, ca.DM(0.0))
+        self._bends = bool(ca.which_depends(static, node.q, 2, True)[0])
+        parts = {"standing": standing, "moving": force - standing, "static": static}
+        self._parts = {n: ca.Function(n, symbols, [ca.densify(x)]) for n, x in parts.items()}
         self._states = StatesAlong(model, node) if model.states else None
 
     def force(self, log: Filtered, values: Mapping[str, float]) -> Array:
-        """Force (k,) at the judged rows; `values` holds every name of `names`."""
-        found = np.asarray(self._force(*self._arguments(log, values))).ravel()
-        return found + self._bent(log, values) if self._bends else found
+        """Force (k,) at the judged rows; `values` holds every name of `names`.
+
+        The measured force is behind a filter. What bends with the motion is not the same behind the
+        filter as of a motion that is behind it: it is told of what was read, and filtered itself.
+        """
+        s, q, v, a, u, p = self._arguments(log, values)
+
+        def part(name: str, q: Array, v: Array) -> Array:
+            return np.asarray(self._parts[name](s, q, v, a, u, p)).ravel()
+
+        straight, bent = part("standing", q, v), part("moving", q, log.quick[None])
+        if self._bends:
+            straight -= part("static", q, v)
+            bent += part("static", log.read[None], v)
+        return np.asarray((straight + log.smoothed(bent))[log.rows])
 
     def slopes(self, log: Filtered, values: Mapping[str, float]) -> Array:
         """Slopes (k, 1 + inputs) of the force: by the acceleration and by each input."""
-        found: Array = np.asarray(self._slopes(*self._arguments(log, values)))
-        return np.asarray(found.T)
-
-    def _bent(self, log: Filtered, values: Mapping[str, float]) -> Array:
-        """What the force (k,) of the position is more behind the filter than at the position that
-        is behind it."""
-        p = np.array([values[name] for name in self.names]).reshape(-1, 1)
-        u = np.stack([log.others[name] for name in self.inputs])
-        rest = np.zeros((1, len(log.q)))
-        s, fixed = np.zeros((len(self.model.states), len(log.q))), np.repeat(p, len(log.q), axis=1)
-        read, behind = (
-            np.asarray(self._static(s, q[None], rest, rest, u, fixed)).ravel()
-            for q in (log.read, log.q)
-        )
-        return np.asarray((log.smoothed(read) - behind)[log.rows])
+        at_rows = [c[:, log.rows] for c in self._arguments(log, values)]
+        return np.asarray(np.asarray(self._slopes(*at_rows)).T)
 
     def _arguments(self, log: Filtered, values: Mapping[str, float]) -> list[Array]:
+        """States, motion, inputs and parameters (., n) along the whole log."""
         p = np.array([values[name] for name in self.names]).reshape(-1, 1)
         u = np.stack([log.others[name] for name in self.inputs])
-        rows = log.rows
-        s = self._along(log, u, p[:, 0])[:, rows]
-        fixed = np.repeat(p, len(rows), axis=1)
-        return [s, *(c[None, rows] for c in (log.q, log.v, log.a)), u[:, rows], fixed]
+        s, n = self._along(log, u, p[:, 0]), len(log.q)
+        return [s, *(c[None] for c in (log.q, log.v, log.a)), u, np.repeat(p, n, axis=1)]
 
     def _along(self, log: Filtered, u: Array, p: Array) -> Array:
         """States (ns, n) along the whole log; each stretch begins at rest."""
@@ -76,7 +75,7 @@ class Balance:
         parts = []
         for begin, end in zip(log.begins, np.append(log.begins[1:], len(log.time)), strict=True):
             own = slice(begin, end)
-            middle = [0.5 * (c[own][1:] + c[own][:-1]) for c in (log.q, log.v, log.a, *u)]
+            middle = [0.5 * (c[own][1:] + c[own][:-1]) for c in (log.q, log.quick, log.a, *u)]
             start = self._states.rest(log.q[begin], 0.0, 0.0, u[:, begin], p)
             parts.append(self._states.run(start, np.stack([np.diff(log.time[own]), *middle]), p))
         return np.concatenate(parts, axis=1)
@@ -142,8 +141,8 @@ class Predictor(CompiledModels[Balance]):
         }
         others[self.answer] = log.others[self.answer]
         v, a = moved.rates
-        read = moved.value + log.read - log.q
-        return replace(log, q=moved.value, v=v, a=a, others=others, read=read)
+        read, quick = moved.value + log.read - log.q, v + log.quick - log.v
+        return replace(log, q=moved.value, v=v, a=a, others=others, read=read, quick=quick)
 
     def _values(self, theta: Theta) -> dict[str, float]:
         return self.values(theta, self.at(theta).names)

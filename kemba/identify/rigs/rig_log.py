@@ -25,6 +25,7 @@ GAIN = (0.5311, 0.3756, 0.4600)
 
 # How the channels of a rig's log are filtered.
 WIDTHS = (3, 4, 6, 8, 12, 16, 24, 32)  # widths (1 sigma) in samples that are tried
+QUICK = (1, 2, *WIDTHS)  # the same for a rate of which only the sign is asked
 # noise of the rate that is small enough, as a share of `sign_speed`: the sign of a rate is then
 # certain
 CREEP = 0.2
@@ -40,7 +41,8 @@ class Filtered:
     """Channels on a regular grid, filtered; the grid has jumps where the log has gaps.
 
     `time` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name; `read` (n,): the
-    position as it was read. `rows` (k,): indices of the rows that are judged, away from gaps.
+    position as it was read; `quick` (n,): its rate behind a filter only as wide as its sign needs,
+    1 sigma `quick_width` [s]. `rows` (k,): indices of the rows that are judged, away from gaps.
     `q_sigma`, `v_sigma`, `a_sigma`: noise of the filtered position and its rates; `sigma`: noise of
     the others by name. `width` [s] of the filter. `begins` (m,): first index of every stretch
     without a gap.
@@ -59,6 +61,9 @@ class Filtered:
     width: float
     begins: np.ndarray
     read: Array
+    quick: Array
+    quick_sigma: float
+    quick_width: float
 
     def smoothed(self, values: Array) -> Array:
         """Values (n,) of the grid behind the filter of the channels."""
@@ -97,6 +102,7 @@ def filtered(
          and heavy * _bend_noise(noise, step, s) <= WEIGHT * force),
         WIDTHS[-1],
     )  # fmt: skip
+    quick = next((s for s in QUICK if _rate_noise(noise, step, s) <= CREEP * creep), width)
     names = list(others)
     parts, begins, rows, count = [], [], [], 0
     for first, last in _stretches(time, GAP * step):
@@ -107,7 +113,10 @@ def filtered(
         columns = [np.interp(grid, time, y) for y in (position, *others.values())]
         smooth = [_smooth(y, width) for y in columns]
         v = np.gradient(smooth[0], step)
-        parts.append(np.stack([grid, smooth[0], v, np.gradient(v, step), columns[0], *smooth[1:]]))
+        sharp = np.gradient(_smooth(columns[0], quick), step)
+        parts.append(
+            np.stack([grid, smooth[0], v, np.gradient(v, step), columns[0], sharp, *smooth[1:]])
+        )
         begins.append(count)
         edge = int(REACH * width) + 2
         rows.append(count + np.arange(edge, n - edge, width))
@@ -125,7 +134,7 @@ def filtered(
         table[1],
         table[2],
         table[3],
-        dict(zip(names, table[5:], strict=True)),
+        dict(zip(names, table[6:], strict=True)),
         np.concatenate(rows),
         GAIN[0] * noise / np.sqrt(width),
         _rate_noise(noise, step, width),
@@ -134,6 +143,9 @@ def filtered(
         width * step,
         np.array(begins),
         table[4],
+        table[5],
+        _rate_noise(noise, step, quick),
+        quick * step,
     )
 
 
@@ -204,10 +216,12 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
         what = "has no stretch without gaps that is long enough for a rate"
         hint = "log faster, or longer without a break"
         raise BadData([KembaError(str(log.meta.get("path", name)), what, hint=hint)])
-    v, a = found.v[found.rows], found.a[found.rows]
-    blur = 2.0 * np.hypot(found.v_sigma, a * found.width)
-    high, low = (np.tanh((v + side * blur) / mechanism.sign_speed) for side in (1.0, -1.0))
-    doubt = 0.5 * (high - low)
+    # where the acceleration jumps, the rate behind a filter is off by that share of its width
+    reach = max(round(2.0 * found.width / float(np.median(np.diff(found.time)))), 1)
+    jump = np.abs(np.roll(found.a, -reach) - np.roll(found.a, reach))
+    blur = 2.0 * np.hypot(found.quick_sigma, jump * found.quick_width / np.sqrt(2.0 * np.pi))
+    high, low = (np.tanh((found.quick + s * blur) / mechanism.sign_speed) for s in (1.0, -1.0))
+    doubt = found.smoothed(0.5 * (high - low))[found.rows]
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
         step = float(np.median(np.diff(found.time)))
