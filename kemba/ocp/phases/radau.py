@@ -6,6 +6,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from numpy.polynomial import legendre
 
 from kemba.model import Model
 from kemba.ocp.task.costs import running
@@ -35,18 +36,17 @@ class Scheme:
         return np.linalg.inv(self.butcher)
 
 
-RADAU3 = Scheme(np.array([1 / 3, 1.0]), np.array([[5 / 12, -1 / 12], [3 / 4, 1 / 4]]))
-_R = 6**0.5
-RADAU5 = Scheme(
-    np.array([(4 - _R) / 10, (4 + _R) / 10, 1.0]),
-    np.array(
-        [
-            [(88 - 7 * _R) / 360, (296 - 169 * _R) / 1800, (-2 + 3 * _R) / 225],
-            [(296 + 169 * _R) / 1800, (88 + 7 * _R) / 360, (-2 - 3 * _R) / 225],
-            [(16 - _R) / 36, (16 + _R) / 36, 1 / 9],
-        ]
-    ),
-)
+def radau(stages: int) -> Scheme:
+    """Radau IIA of order 2 stages - 1: the zeros of P_(stages - 1) - P_stages, moved to (0, 1]
+    (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.5)."""
+    points = (np.sort(legendre.legroots([0.0] * (stages - 1) + [1.0, -1.0])) + 1.0) / 2.0
+    powers = np.arange(stages)
+    integrals = points[:, None] ** (powers + 1) / (powers + 1)
+    points[-1] = 1.0
+    return Scheme(points, integrals @ np.linalg.inv(points[:, None] ** powers))
+
+
+RADAU3, RADAU5, RADAU9 = radau(2), radau(3), radau(5)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from kemba.ocp.phases.mode_constraints import (
 )
 from kemba.ocp.phases.modes import Phase, read_phases
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.radau import RADAU3, RADAU5, STATE, Scheme
+from kemba.ocp.phases.radau import RADAU3, RADAU5, RADAU9, STATE, Scheme
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.repair import misfits, repaired, simplified, with_pulses
@@ -167,12 +167,12 @@ class Refiner:
         if self.solution is None or start is None:
             return found
         self.tell("phases: pulses that lower the cost")
-        best = with_pulses(self.solution, lambda p: self.build(p, start, RADAU5)[0], self.control)
+        scheme = self.solution[0].scheme
+        best = with_pulses(self.solution, lambda p: self.build(p, start, scheme)[0], self.control)
         if best is self.solution:
             return found
         made = read(*best)
-        kept = made.certificate is not None and made.certificate.within(self.task.tolerances)
-        return replace(made, plain=found) if kept else found
+        return replace(made, plain=found) if self._keeps(made) else found
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended.
@@ -252,14 +252,31 @@ class Refiner:
 
     def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
         """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
-        one."""
+        one; with more stages where what holds at its nodes by the rates alone, such as a closed
+        contact, drifts further than the certificate allows."""
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
-        program, _ = self.build(coarser.phases, self.plan, RADAU5)
-        start = carried(program, coarser.columns, coarser.scheme.points, x)
+        solution, made = self._by(RADAU5, coarser, x)
+        if made.solved and not self._keeps(made):
+            self.tell("phases: with more stages in every element")
+            finest, better = self._by(RADAU9, solution[0], solution[1].Y)
+            if self._keeps(better):
+                solution, made = finest, better
+        if made.solved:
+            self.solution = solution
+        return made
+
+    def _by(
+        self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
+    ) -> tuple[tuple[PhaseProgram, Iterate], Refined]:
+        """The exact program with a scheme, solved from a solution `x` (size,) of another one."""
+        program, _ = self.build(other.phases, self.plan, scheme)
+        start = carried(program, other.columns, other.scheme.points, x)
         found = self._solve(program, start, warm(Refining.rough_iterations))
-        if found.solved:
-            self.solution = program, found
-        return read(program, found)
+        return (program, found), read(program, found)
+
+    def _keeps(self, found: Refined) -> bool:
+        """Whether a plan keeps to all that its certificate measures."""
+        return found.certificate is not None and found.certificate.within(self.task.tolerances)
 
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
@@ -287,7 +304,7 @@ class Refiner:
 
     def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
-        exact = program.scheme is RADAU5 and not program.elastic
+        exact = program.scheme is not RADAU3 and not program.elastic
         found = (solve_along if exact else solve)(program, Iterate(start), options, self.control)
         self.iterations += found.iterations
         return found
