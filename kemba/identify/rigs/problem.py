@@ -13,7 +13,6 @@ from typing_extensions import Self
 
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
-from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
     CandidateSettings,
@@ -334,7 +333,7 @@ class RigProblem(ColouredProblem):
             fault
             for log, sigma in zip(self.logs, self._sigma, strict=True)
             for fault in contradictions(
-                log, self.model, rms(sigma), lambda trial: self.predictor.gap(trial, {})
+                log, self.model, sigma, lambda trial: self.predictor.gap(trial, {})
             )
         ]
         if faults:
