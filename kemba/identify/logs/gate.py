@@ -311,6 +311,10 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
             what = f"reads {np.median(y[good]):.4g} Pa, less than any air pressure"
             hint = "is it in bar or kPa, or above the atmosphere? Convert it with --map"
             yield _log_fault(log, what, "pascals, absolute, were expected", hint, column=name)
+        elif name == "piston/x" and _travel(y) > log.meta["stroke"] + GateSettings.beyond:
+            what = f"moves by {1e3 * _travel(y):.4g} mm"
+            expected = f"a stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
+            yield _log_fault(log, what, expected, "is its unit wrong? See --map", column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:

@@ -9,6 +9,7 @@ import pytest
 from kemba.config import dump_yaml
 from kemba.identify.logs.gate import BadData
 from kemba.identify.rigs.problem import rig_problem
+from kemba.identify.workflow import discover_logs
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -128,6 +129,28 @@ def test_a_seal_rubs_against_the_motion_and_tells_the_end(tmp_path: Path) -> Non
     read = {**right, "piston/x [m]": 0.12 - right["piston/x [m]"]}
     with pytest.raises(BadData, match=r"log: piston/x counts from the extended end .*; the force"):
         rig_problem([Trajectory(TIME, read, RUN)], model).validate()
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("piston/x [m]", 10.0, r"moves by 599.9 mm; a stroke of 120 mm was expected; is its unit"),
+        ("piston/x [m]", 39.37, "moves by .* is its unit wrong"),
+        (
+            "piston/F [N]",
+            1 / 4.448,
+            "gain of piston/F would be off by more than any sensor.s is; its",
+        ),
+        ("chamber/retract/P [Pa]", 1.6, "gain of chamber/retract/P would be off"),
+    ],
+)
+def test_another_unit_is_no_effect(column: str, factor: float, words: str, tmp_path: Path) -> None:
+    """Decimetres and inches as metres, pounds as newtons, a bar that is none."""
+    rig_of(tmp_path)
+    log, read = tmp_path / "log.csv", cylinder(12.0)
+    Trajectory(TIME, {**read, column: factor * read[column]}, {"kind": "cylinder"}).write(log)
+    answer, _ = discover_logs([log], (), str(tmp_path / "model.yaml"))
+    assert not answer.writes and re.search(words, answer.sentence), answer.sentence
 
 
 def test_friction_and_small_zeros_are_no_mistakes() -> None:
