@@ -12,17 +12,21 @@ from scipy.optimize import lsq_linear
 from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array, Flags, Rows
-from kemba.identify.robot.batch import Batch
-from kemba.identify.robot.mix_ups import SAME, command_mix_ups, corrected
+from kemba.identify.robot.batch import Batch, ResampledLog
+from kemba.identify.robot.mix_ups import command_mix_ups, corrected, in_the_air
 from kemba.identify.robot.state import LinearisedState
 
 HINT = "correct it in a column map (--map)"
-BETTER = 1.5  # factor by which a log must err less without a mistake about its commands
+BETTER = 2.0  # factor by which a log must err less without a mistake about its commands
+SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was smoothed with it
 
 
-def mixed_commands(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
+def mixed_commands(
+    state: LinearisedState, rows: Rows, r: Array, errs: Callable[[ResampledLog], float]
+) -> Iterator[KembaError]:
     """The mistake about commands without which the model as it is leaves much less than the
-    residual r (n,), run by run, with all that leave as little."""
+    residual r (n,), run by run, with all that leave as little; of a flight, in which feet tell
+    nothing, about any column: `errs` tells what the model leaves of another log."""
     runs = range(len(state.batch.resampled))
     before = [rms(r[rows.run == i]) for i in runs]
     if max(before) < BETTER:
@@ -34,16 +38,17 @@ def mixed_commands(state: LinearisedState, rows: Rows, r: Array) -> Iterator[Kem
     for i, log in enumerate(state.batch.resampled):
         own = rows.run == i
         after = {text: rms(other[own]) for text, other in left.items()}
+        for mistake in in_the_air(state.physics, log):
+            after[mistake.text] = errs(corrected(log, state.physics, [mistake]))
         best = min(after, key=after.__getitem__)
-        power = _power(state.physics.channels, left[best], rows, own)
+        power = _power(state.physics.channels, left.get(best, 0.0 * r), rows, own)
         if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
-            yield KembaError(
-                log.name,
-                "; or ".join(text for text, e in after.items() if e <= SAME * after[best]),
-                f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f} times "
-                "then",
-                HINT,
+            most = np.hypot(after[best], SLIGHT * before[i])
+            said = "; or ".join(text for text, error in after.items() if error <= most)
+            what = (
+                f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f} times"
             )
+            yield KembaError(log.name, said, f"{what} then", HINT)
 
 
 def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:
