@@ -5,6 +5,7 @@ residual of the whole log along the same measured motion.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -24,31 +25,34 @@ SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was sm
 def mixed_commands(
     state: LinearisedState, rows: Rows, r: Array, errs: Callable[[ResampledLog], float]
 ) -> Iterator[KembaError]:
-    """The mistake about commands without which the model as it is leaves much less than the
-    residual r (n,), run by run, with all that leave as little; of a flight, in which feet tell
-    nothing, about any column: `errs` tells what the model leaves of another log."""
-    runs = range(len(state.batch.resampled))
-    before = [rms(r[rows.run == i]) for i in runs]
+    """The mistake about commands, or two of them, without which the model as it is leaves much less
+    than the residual r (n,), run by run, with all that leave as little; of a flight, in which feet
+    tell nothing, about any column: `errs` tells what the model leaves of another log."""
+    physics, logs = state.physics, state.batch.resampled
+    before, found = [rms(r[rows.run == i]) for i in range(len(logs))], False
     if max(before) < BETTER:
         return  # noise alone leaves one
-    left = {}
-    for mistake in command_mix_ups(state.physics.legs):
-        right = [corrected(log, state.physics, [mistake]) for log in state.batch.resampled]
-        left[mistake.text] = state.commanded(Batch(tuple(right)))
-    for i, log in enumerate(state.batch.resampled):
-        own = rows.run == i
-        after = {text: rms(other[own]) for text, other in left.items()}
-        for mistake in in_the_air(state.physics, log):
-            after[mistake.text] = errs(corrected(log, state.physics, [mistake]))
-        best = min(after, key=after.__getitem__)
-        power = _power(state.physics.channels, left.get(best, 0.0 * r), rows, own)
-        if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
-            most = np.hypot(after[best], SLIGHT * before[i])
-            said = "; or ".join(text for text, error in after.items() if error <= most)
-            what = (
-                f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f} times"
-            )
-            yield KembaError(log.name, said, f"{what} then", HINT)
+    for some in (1, 2):
+        left = {}
+        for mistakes in combinations(command_mix_ups(physics.legs), some):
+            if some == 1 or not mistakes[0].about & mistakes[1].about:
+                right = [corrected(log, physics, mistakes) for log in logs]
+                left[" and ".join(m.text for m in mistakes)] = state.commanded(Batch(tuple(right)))
+        for i, log in enumerate(logs):
+            own = rows.run == i
+            after = {text: rms(other[own]) for text, other in left.items()}
+            if some == 1:
+                known = in_the_air(physics, log)
+                after |= {m.text: errs(corrected(log, physics, [m])) for m in known}
+            best = min(after, key=after.__getitem__)
+            power = _power(physics.channels, left.get(best, 0.0 * r), rows, own)
+            if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
+                most, found = np.hypot(after[best], SLIGHT * before[i]), True
+                said = "; or ".join(text for text, error in after.items() if error <= most)
+                what = f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f}"
+                yield KembaError(log.name, said, f"{what} times then", HINT)
+        if found:
+            return
 
 
 def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:

@@ -63,6 +63,15 @@ def test_mistakes_about_commands(mistake: str, logs: list[Trajectory]) -> None:
         problem(taken(logs[0], change)).validate()
 
 
+def test_two_mistakes_about_commands(logs: list[Trajectory]) -> None:
+    read = {name: -logs[0][name] for name in TORQUES} | {FRONT[0]: 1.0 - logs[0][FRONT[0]]}
+    words = (
+        r"hip/tau of every leg has the reversed sign and valve/extend is inverted \(1 is on\) at"
+    )
+    with pytest.raises(BadData, match=words):
+        problem(taken(logs[0], read)).validate()
+
+
 @pytest.mark.parametrize(
     ("columns", "change", "words"),
     [
