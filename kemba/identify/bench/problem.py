@@ -111,10 +111,7 @@ class BenchProblem(ColouredProblem):
     """
 
     def __init__(
-        self,
-        runs: Iterable[BenchLog],
-        model: Model,
-        drift: clocks.Drift | None = None,
+        self, runs: Iterable[BenchLog], model: Model, drift: clocks.Drift | None = None
     ) -> None:
         logs, self.drift = tuple(runs), drift
         self.model = model

@@ -70,7 +70,7 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
 
 def crossed(run: BenchLog, expected: Mapping[str, tuple[Array, Array]]) -> list[KembaError]:
     """Pressures that follow the valves much better the other way round, whatever their zeros;
-    `expected`: what the model makes of each channel."""
+    `expected`: reading and variance (n,) of each channel by the model."""
     if not run.measured.keys() >= set(PRESSURES):
         return []
     keep = run.keep[PRESSURES[0]] & run.keep[PRESSURES[1]]

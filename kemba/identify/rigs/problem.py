@@ -310,16 +310,11 @@ class RigProblem(ColouredProblem):
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
         """The force (n,) [N] that is missing, per run."""
+        gaps = (-self.predictor.gap(log, theta or {}) for log in self.logs)
+        channel = (self.answer, self.unit)
         return [
-            missing_along(
-                log.name,
-                log.time,
-                -self.predictor.gap(log, theta or {}),
-                sigma**2,
-                (self.answer, self.unit),
-                strength,
-            )
-            for log, sigma in zip(self.logs, self._sigma, strict=True)
+            missing_along(log.name, log.time, gap, sigma**2, channel, strength)
+            for log, gap, sigma in zip(self.logs, gaps, self._sigma, strict=True)
         ]
 
     def window_errors(self, theta: Theta) -> Mapping[str, Array]:

@@ -87,12 +87,11 @@ def contradictions(
             power = _power(state.physics.channels, forgiven, rows, own)
         worst = max(power, key=power.__getitem__, default="")
         if worst and power[worst] > ABSURD and not sunk:
+            what = f"{worst} is off by {power[worst]:.0f} times its noise from one row to the next"
+            hint = "are columns swapped, a sign turned, or clocks apart? or does a part swing that "
+            hint += "the model holds rigid, such as the boom?"
             yield KembaError(
-                log.name,
-                f"{worst} is off by {power[worst]:.0f} times its noise from one row to the next",
-                "motion that follows from the commands was expected",
-                "are columns swapped, a sign turned, or clocks apart? or does a part swing that "
-                "the model holds rigid, such as the boom?",
+                log.name, what, "motion that follows from the commands was expected", hint
             )
 
 
@@ -106,13 +105,10 @@ def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
         depth = ground.depth(x, ground.height(x) + distance / ground.normal(x)[1])
         if np.mean(depth > DEEP) > OFTEN:
             at = int(np.argmax(depth))
-            yield KembaError(
-                log.name,
-                f"the {leg} foot would be {1e3 * depth[at]:.0f} mm below the ground "
-                f"at {log.time[at]:.3f} s",
-                "a foot on or above it was expected",
-                f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?",
-            )
+            far = f"{1e3 * depth[at]:.0f} mm below the ground at {log.time[at]:.3f} s"
+            what = f"the {leg} foot would be {far}"
+            hint = f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?"
+            yield KembaError(log.name, what, "a foot on or above it was expected", hint)
 
 
 def _power(channels: Sequence[str], r: Array, rows: Rows, own: Flags) -> dict[str, float]:
