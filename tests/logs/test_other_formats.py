@@ -39,8 +39,10 @@ def same(back: Trajectory, log: Trajectory, atol: float = 1e-9) -> None:
         assert np.quantile(np.abs(back[name][good] - expected), 0.98) <= slack, name
 
 
-def test_mdf(tmp_path: Path) -> None:
-    """Two groups at their own rates, units as the file states them."""
+@pytest.mark.parametrize("piece", [20_000, 40, 33])
+def test_mdf(piece: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two groups at their own rates, units as the file states them, in however many pieces."""
+    monkeypatch.setattr("kemba.logs.formats.measured.PIECE", piece)
     log = robot_log()
     back = read_back(mdf(log, tmp_path / "log.mf4"), tmp_path)
     same(back, log, 1e-6)

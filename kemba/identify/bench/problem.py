@@ -19,7 +19,7 @@ from kemba.identify.bench.bench_log import (
     prepare,
 )
 from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, settle_starts, standardised
-from kemba.identify.bench.validate import contradictions
+from kemba.identify.bench.validate import contradictions, crossed
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.infer.linear import within
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
@@ -111,10 +111,7 @@ class BenchProblem(ColouredProblem):
     """
 
     def __init__(
-        self,
-        runs: Iterable[BenchLog],
-        model: Model,
-        drift: clocks.Drift | None = None,
+        self, runs: Iterable[BenchLog], model: Model, drift: clocks.Drift | None = None
     ) -> None:
         logs, self.drift = tuple(runs), drift
         self.model = model
@@ -341,13 +338,12 @@ class BenchProblem(ColouredProblem):
     @cached_property
     def contradictions(self) -> list[KembaError]:
         """What must be wrong with the columns of the logs."""
-        stroke = self.model.mechanism.stroke
+        stroke, predictor = self.model.mechanism.stroke, self.predictor
         return [
             fault
             for log in self.logs
-            for fault in contradictions(
-                log, stroke, lambda trial: self.predictor.predict(trial, {}).force
-            )
+            for fault in contradictions(log, stroke, lambda run: predictor.predict(run, {}).force)
+            or crossed(log, predictor.readings(log, {}, {}))
         ]
 
 

@@ -1,7 +1,7 @@
 """Are columns of a bench log mixed up? The nominal prediction is tried on each usual mistake, and
 on those of several columns together."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 
@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from kemba.effects.pneumatics.switching import Pulse, inverted
 from kemba.errors import KembaError
-from kemba.identify.bench.bench_log import BenchLog
+from kemba.identify.bench.bench_log import PRESSURES, BenchLog
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 
@@ -59,15 +59,30 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
     if lagging := _clock(run, predict):
         return lagging
     if as_read[()] > NOTHING:
-        return [
-            KembaError(
-                run.name,
-                "piston/F does not follow the valves at all",
-                f"the model leaves {as_read[()]:.1f} of its spread",
-                "are columns swapped, or the logs of another test?",
-            )
-        ]
+        what, left = (
+            "piston/F does not follow the valves at all",
+            f"{as_read[()]:.1f} of its spread",
+        )
+        hint = "are columns swapped, or the logs of another test?"
+        return [KembaError(run.name, what, f"the model leaves {left}", hint)]
     return []
+
+
+def crossed(run: BenchLog, expected: Mapping[str, tuple[Array, Array]]) -> list[KembaError]:
+    """Pressures that follow the valves much better the other way round, whatever their zeros;
+    `expected`: reading and variance (n,) of each channel by the model."""
+    if not run.measured.keys() >= set(PRESSURES):
+        return []
+    keep = run.keep[PRESSURES[0]] & run.keep[PRESSURES[1]]
+
+    def left(names: Iterable[str]) -> float:
+        pairs = zip(PRESSURES, names, strict=True)
+        return sum(float(np.var((expected[a][0] - run.measured[b])[keep])) for a, b in pairs)
+
+    if left(PRESSURES[::-1]) * BETTER**2 > left(PRESSURES):
+        return []
+    said = f"{' and '.join(PRESSURES)} are swapped"
+    return [KembaError(run.name, said, "they follow the valves so much better then")]
 
 
 def simplest(trials: Left, small: float) -> list[Texts]:
@@ -159,16 +174,9 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
     if place in (0, 2 * far):  # the correlation still rises there: this is no lag
         return []
     lag = (place - far) * RESOLUTION
-    if abs(lag) <= LATEST or near.max() < LIKE:
+    if abs(lag) <= LATEST or near.max() < max(LIKE, MORE_ALIKE * both[middle]):
         return []
-    if near.max() < MORE_ALIKE * both[middle]:
-        return []
-    word = "late" if lag > 0 else "early"
-    return [
-        KembaError(
-            run.name,
-            f"piston/F comes {abs(lag) * 1e3:.0f} ms {word} against the valves and the motion",
-            "one clock for all columns was expected",
-            "correct it with `delay` in a column map",
-        )
-    ]
+    late = f"{abs(lag) * 1e3:.0f} ms {'late' if lag > 0 else 'early'}"
+    what = f"piston/F comes {late} against the valves and the motion"
+    expected = "one clock for all columns was expected"
+    return [KembaError(run.name, what, expected, "correct it with `delay` in a column map")]

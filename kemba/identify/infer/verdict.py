@@ -6,12 +6,15 @@ from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, VerdictSettings
 from kemba.identify.infer.cross_validation import HeldOut, error
 from kemba.identify.infer.formula import Formula
+from kemba.identify.infer.ranking import values
 from kemba.identify.infer.residual import Drift, explains_structure, pattern_left, unfinished
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import excess
 from kemba.identify.problem.sensor_faults import is_fault
+
+GROSS = 0.2  # error of a gain that is another unit, and no sensor's: ten times its usual size
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ def caveats_of(
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
     settings, reasons, best = VerdictSettings, [], selection.best
+    if gross := _other_units(search, best):
+        return Caveats(gross)
     before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part
     if drift is not None:
@@ -52,14 +57,11 @@ def caveats_of(
         reasons.append(ENDED)
         least = 0.0  # however little it explains, nothing else could be asked
     if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
-        reasons.append(
-            f"{enumerated(best)} fits best, but leaves an error of {after:.3g} times the noise"
-        )
+        leaves = f"leaves an error of {after:.3g} times the noise"
+        reasons.append(f"{enumerated(best)} fits best, but {leaves}")
     if not best and selection.p_value <= settings.unexplained and before > settings.whole:
-        reasons.append(
-            f"the model as it is leaves an error of {before:.3g} times the noise, and no effect "
-            "explains enough of it"
-        )
+        leaves = f"the model as it is leaves an error of {before:.3g} times the noise"
+        reasons.append(f"{leaves}, and no effect explains enough of it")
     if selection.rivals:
         others = ", ".join(" + ".join(h) for h in selection.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
@@ -68,6 +70,17 @@ def caveats_of(
     if unsure and not reasons:
         return Caveats((ENDED,), part=True, unsure=unsure)
     return Caveats(tuple(reasons), part, unsure)
+
+
+def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
+    """What to say of sensors whose gain would be off by more than that of any sensor is."""
+    scales = (effect for effect in best if effect.startswith("sensor_scale:"))
+    return tuple(
+        f"the gain of {effect.partition(':')[2]} would be off by more than any sensor's is; its "
+        "unit is wrong, or its scale in a map (--map)"
+        for effect in scales
+        if abs(values(search, best, effect)["k"].value) > GROSS
+    )
 
 
 def _unasked(search: Search, best: Hypothesis) -> Hypothesis:

@@ -179,14 +179,8 @@ def _range(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     if outside.mean() > few:
         i = int(np.argmax(outside))
         what = f"the reading {y[i]:.6g} {log.unit(name)} cannot be ({int(outside.sum())} rows)"
-        yield _log_fault(
-            log,
-            what,
-            f"{expected.split(';')[0]} expected",
-            expected.partition("; ")[2],
-            row=i,
-            column=name,
-        )
+        right, _, hint = expected.partition("; ")
+        yield _log_fault(log, what, f"{right} expected", hint, row=i, column=name)
 
 
 def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
@@ -234,9 +228,8 @@ def _excitation(log: Trajectory) -> Iterator[KembaError]:
     moving = [n for n in needed(log) if n.endswith("/x") or n == "body/z"]
     moved = any(_travel(log[n]) > limits.moves for n in moving)
     if not switched and not moved:
-        yield _log_fault(
-            log, "no valve switches and nothing moves", "a log with excitation was expected"
-        )
+        what = "no valve switches and nothing moves"
+        yield _log_fault(log, what, "a log with excitation was expected")
         return
     if log.meta["kind"] == "bench" and _travel(log["piston/F"]) == 0.0:
         yield _log_fault(log, "never changes", "is the sensor dead?", column="piston/F", row=0)
@@ -311,6 +304,10 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
             what = f"reads {np.median(y[good]):.4g} Pa, less than any air pressure"
             hint = "is it in bar or kPa, or above the atmosphere? Convert it with --map"
             yield _log_fault(log, what, "pascals, absolute, were expected", hint, column=name)
+        elif name == "piston/x" and _travel(y) > log.meta["stroke"] + GateSettings.beyond:
+            what = f"moves by {1e3 * _travel(y):.4g} mm"
+            expected = f"a stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
+            yield _log_fault(log, what, expected, "is its unit wrong? See --map", column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:

@@ -13,7 +13,6 @@ from typing_extensions import Self
 
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
-from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
     CandidateSettings,
@@ -311,16 +310,11 @@ class RigProblem(ColouredProblem):
         self, theta: Theta | None = None, strength: Array | None = None
     ) -> list[MissingForce]:
         """The force (n,) [N] that is missing, per run."""
+        gaps = (-self.predictor.gap(log, theta or {}) for log in self.logs)
+        channel = (self.answer, self.unit)
         return [
-            missing_along(
-                log.name,
-                log.time,
-                -self.predictor.gap(log, theta or {}),
-                sigma**2,
-                (self.answer, self.unit),
-                strength,
-            )
-            for log, sigma in zip(self.logs, self._sigma, strict=True)
+            missing_along(log.name, log.time, gap, sigma**2, channel, strength)
+            for log, gap, sigma in zip(self.logs, gaps, self._sigma, strict=True)
         ]
 
     def window_errors(self, theta: Theta) -> Mapping[str, Array]:
@@ -334,7 +328,7 @@ class RigProblem(ColouredProblem):
             fault
             for log, sigma in zip(self.logs, self._sigma, strict=True)
             for fault in contradictions(
-                log, self.model, rms(sigma), lambda trial: self.predictor.gap(trial, {})
+                log, self.model, sigma, lambda trial: self.predictor.gap(trial, {})
             )
         ]
         if faults:

@@ -34,7 +34,7 @@ CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]:
 WINDOW = 0.1  # time in which a standing foot does not move [s]
 SMOOTH = 0.02  # time over which readings are smoothed [s]
 ROW = 0.005  # distance of the rows that are looked at [s]
-FEWEST = 10  # rows on the ground from which feet can be judged
+FEWEST = 3  # rows on the ground from which feet can be judged
 STILL = 2.5e-3  # error of a standing foot that sensors make which are right [m]
 # error of a standing foot that sensors make, and distance by which a mistake must move a foot, or
 # it is an effect [m]: a late encoder moves one by 9 mm
@@ -232,6 +232,13 @@ def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
             yield _swap(f"{x} of the legs is swapped", pair)
         yield _swap("the valves of the legs are swapped", *list(crossed.values())[1:])
         yield _swap("the commands of the legs are swapped", *crossed.values())
+
+
+def in_the_air(physics: Physics, log: ResampledLog) -> list[MixUp]:
+    """Mistakes in the columns of a log whose feet tell nothing, but for those of a zero."""
+    known = mix_ups(physics.legs, physics.mechanism.stroke)
+    told = _Feet(physics, log).restless([]) is not None
+    return [] if told else [mistake for mistake in known if mistake.at is None]
 
 
 def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:

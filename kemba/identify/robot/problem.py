@@ -280,7 +280,7 @@ class RobotProblem(Problem):
         if self.mixed:
             return self.mixed
         r, rows = self.residual(self.lengths), self.rows()
-        if faults := list(mixed_commands(self.state, rows, r)):
+        if faults := list(mixed_commands(self.state, rows, r, self._left(self.physics))):
             return faults
         return list(contradictions(self.state, rows, r, self._sensor_columns))
 

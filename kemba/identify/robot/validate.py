@@ -5,6 +5,7 @@ residual of the whole log along the same measured motion.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -12,38 +13,46 @@ from scipy.optimize import lsq_linear
 from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array, Flags, Rows
-from kemba.identify.robot.batch import Batch
-from kemba.identify.robot.mix_ups import SAME, command_mix_ups, corrected
+from kemba.identify.robot.batch import Batch, ResampledLog
+from kemba.identify.robot.mix_ups import command_mix_ups, corrected, in_the_air
 from kemba.identify.robot.state import LinearisedState
 
 HINT = "correct it in a column map (--map)"
-BETTER = 1.5  # factor by which a log must err less without a mistake about its commands
+BETTER = 2.0  # factor by which a log must err less without a mistake about its commands
+SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was smoothed with it
 
 
-def mixed_commands(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
-    """The mistake about commands without which the model as it is leaves much less than the
-    residual r (n,), run by run, with all that leave as little."""
-    runs = range(len(state.batch.resampled))
-    before = [rms(r[rows.run == i]) for i in runs]
+def mixed_commands(
+    state: LinearisedState, rows: Rows, r: Array, errs: Callable[[ResampledLog], float]
+) -> Iterator[KembaError]:
+    """The mistake about commands, or two of them, without which the model as it is leaves much less
+    than the residual r (n,), run by run, with all that leave as little; of a flight, in which feet
+    tell nothing, about any column: `errs` tells what the model leaves of another log."""
+    physics, logs = state.physics, state.batch.resampled
+    before, found = [rms(r[rows.run == i]) for i in range(len(logs))], False
     if max(before) < BETTER:
         return  # noise alone leaves one
-    left = {}
-    for mistake in command_mix_ups(state.physics.legs):
-        right = [corrected(log, state.physics, [mistake]) for log in state.batch.resampled]
-        left[mistake.text] = state.commanded(Batch(tuple(right)))
-    for i, log in enumerate(state.batch.resampled):
-        own = rows.run == i
-        after = {text: rms(other[own]) for text, other in left.items()}
-        best = min(after, key=after.__getitem__)
-        power = _power(state.physics.channels, left[best], rows, own)
-        if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
-            yield KembaError(
-                log.name,
-                "; or ".join(text for text, e in after.items() if e <= SAME * after[best]),
-                f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f} times "
-                "then",
-                HINT,
-            )
+    for some in (1, 2):
+        left = {}
+        for mistakes in combinations(command_mix_ups(physics.legs), some):
+            if some == 1 or not mistakes[0].about & mistakes[1].about:
+                right = [corrected(log, physics, mistakes) for log in logs]
+                left[" and ".join(m.text for m in mistakes)] = state.commanded(Batch(tuple(right)))
+        for i, log in enumerate(logs):
+            own = rows.run == i
+            after = {text: rms(other[own]) for text, other in left.items()}
+            if some == 1:
+                known = in_the_air(physics, log)
+                after |= {m.text: errs(corrected(log, physics, [m])) for m in known}
+            best = min(after, key=after.__getitem__)
+            power = _power(physics.channels, left.get(best, 0.0 * r), rows, own)
+            if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
+                most, found = np.hypot(after[best], SLIGHT * before[i]), True
+                said = "; or ".join(text for text, error in after.items() if error <= most)
+                what = f"the log errs by {before[i]:.1f} times its noise, and by {after[best]:.1f}"
+                yield KembaError(log.name, said, f"{what} times then", HINT)
+        if found:
+            return
 
 
 def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:
@@ -78,12 +87,11 @@ def contradictions(
             power = _power(state.physics.channels, forgiven, rows, own)
         worst = max(power, key=power.__getitem__, default="")
         if worst and power[worst] > ABSURD and not sunk:
+            what = f"{worst} is off by {power[worst]:.0f} times its noise from one row to the next"
+            hint = "are columns swapped, a sign turned, or clocks apart? or does a part swing that "
+            hint += "the model holds rigid, such as the boom?"
             yield KembaError(
-                log.name,
-                f"{worst} is off by {power[worst]:.0f} times its noise from one row to the next",
-                "motion that follows from the commands was expected",
-                "are columns swapped, a sign turned, or clocks apart? or does a part swing that "
-                "the model holds rigid, such as the boom?",
+                log.name, what, "motion that follows from the commands was expected", hint
             )
 
 
@@ -97,13 +105,10 @@ def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
         depth = ground.depth(x, ground.height(x) + distance / ground.normal(x)[1])
         if np.mean(depth > DEEP) > OFTEN:
             at = int(np.argmax(depth))
-            yield KembaError(
-                log.name,
-                f"the {leg} foot would be {1e3 * depth[at]:.0f} mm below the ground "
-                f"at {log.time[at]:.3f} s",
-                "a foot on or above it was expected",
-                f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?",
-            )
+            far = f"{1e3 * depth[at]:.0f} mm below the ground at {log.time[at]:.3f} s"
+            what = f"the {leg} foot would be {far}"
+            hint = f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?"
+            yield KembaError(log.name, what, "a foot on or above it was expected", hint)
 
 
 def _power(channels: Sequence[str], r: Array, rows: Rows, own: Flags) -> dict[str, float]:

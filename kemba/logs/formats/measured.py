@@ -10,6 +10,8 @@ from kemba.errors import KembaError
 from kemba.logs.formats import check_size
 from kemba.logs.recording import TIME_WORD, Column, Group, Raw, Recording, free, recording, shared
 
+PIECE = 20_000  # rows of a group that are read at once
+
 
 def read_mf4(path: Path) -> Recording:
     """Measurement data format, versions 3 and 4: physical values, one clock a channel group."""
@@ -22,32 +24,39 @@ def read_mf4(path: Path) -> Recording:
 
 
 def _mdf_group(file: Any, number: int) -> Group | None:
-    columns: Raw = {}
-    units: dict[str, str] = {}
-    signals = [
-        signal
-        for signal in file.select(
-            [(None, number, i) for i in range(len(file.groups[number].channels))],
+    """The channels of numbers of one group, read in pieces: asammdf needs thrice their size."""
+    group = file.groups[number]
+    master, rows, read = file.masters_db.get(number), int(group.channel_group.cycles_nr), 0
+    clock = group.channels[master].name if master is not None else None
+    wanted = [(None, number, i) for i in range(len(group.channels))]
+    table: dict[int, Column] = {}
+    time = np.empty(rows)
+    for begin in range(0, rows, PIECE):
+        signals = file.select(
+            wanted,
+            record_offset=begin,
+            record_count=PIECE,
+            copy_master=False,
             ignore_value2text_conversions=True,  # a valve is 0 or 1, not a text
         )
-        if signal.samples.dtype.kind in "fiub" and signal.samples.ndim == 1
-    ]
-    master = file.masters_db.get(number)
-    names = {file.groups[number].channels[master].name} if master is not None else set()
-    for signal in signals:
-        if signal.name in names or not len(signal.samples):
-            continue
-        name = free(signal.name, columns)
-        invalid = signal.invalidation_bits
-        columns[name] = (
-            signal.samples if invalid is None else np.where(invalid, np.nan, signal.samples)
-        )
-        if signal.unit:
-            units[name] = signal.unit
-    if not columns:
-        return None
-    first = next(s for s in signals if s.name in columns)
-    return Group("", np.asarray(first.timestamps, dtype=float), "s", columns, units)
+        for i, signal in enumerate(signals):
+            values, invalid = signal.samples, signal.invalidation_bits
+            if signal.name == clock or values.dtype.kind not in "fiub" or values.ndim > 1:
+                continue
+            read = begin + len(values)
+            values = values if invalid is None else np.where(invalid, np.nan, values)
+            table.setdefault(i, np.empty(rows, values.dtype))[begin:read] = values
+            time[begin:read] = signal.timestamps
+        if read < begin + PIECE:
+            break  # the last piece, or a file that was cut off
+    columns: Raw = {}
+    units: dict[str, str] = {}
+    for i, values in table.items():
+        name = free(signals[i].name, columns)
+        columns[name] = values[:read]
+        if signals[i].unit:
+            units[name] = signals[i].unit
+    return Group("", time[:read], "s", columns, units) if read else None
 
 
 def read_tdms(path: Path) -> Recording:

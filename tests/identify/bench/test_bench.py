@@ -142,6 +142,10 @@ def test_pressures_are_read_when_there_are_any(bench_log: BenchLog) -> None:
     problem = bench_problem([log.with_columns(columns)], model)
     assert problem.channels == ("piston/F", "chamber/extend/P", "chamber/retract/P")
     assert np.sqrt(np.mean(problem.residual({}) ** 2)) == pytest.approx(1.0, abs=0.15)
+    assert not problem.contradictions
+    swapped = dict(zip(columns, reversed(columns.values()), strict=True))
+    (fault,) = bench_problem([log.with_columns(swapped)], model).contradictions
+    assert "chamber/extend/P and chamber/retract/P are swapped" in str(fault)
 
 
 def test_a_pressure_of_states_that_diverge_is_no_warning() -> None:

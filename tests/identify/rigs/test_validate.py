@@ -1,12 +1,16 @@
 """Mistakes in the columns of a drive's log and a cylinder's: signs, ends, zeros."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from kemba.config import dump_yaml
 from kemba.identify.logs.gate import BadData
 from kemba.identify.rigs.problem import rig_problem
+from kemba.identify.workflow import discover_logs
+from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -65,6 +69,88 @@ def test_a_cylinder() -> None:
         else:
             with pytest.raises(BadData, match=r"piston/F has the reversed sign .*; the force"):
                 problem.validate()
+
+
+SIDES = "chamber/extend/P [Pa]", "chamber/retract/P [Pa]"
+RUN = {"kind": "cylinder", "name": "log"}
+
+
+def rig_of(folder: Path) -> Model:
+    rig = {"kind": "cylinder", "bore": "40 mm", "rod": "16 mm", "stroke": "120 mm"}
+    dump_yaml({"rig": rig, "effects": []}, folder / "model.yaml")
+    return load_model(folder / "model.yaml")
+
+
+def cylinder(friction: float) -> dict[str, np.ndarray]:
+    """A cylinder of 40 mm with a rod of 16 mm, both pressures measured."""
+    extend, retract = (3e5 + 2e5 * np.sin(w * TIME) for w in (3.0, 2.2))
+    x, area = 0.06 + 0.03 * np.sin(1.3 * TIME), np.pi / 4 * 0.04**2
+    push = area * (extend - 101325.0) - area * (1.0 - 0.4**2) * (retract - 101325.0)
+    force = push - friction * np.tanh(np.gradient(x, TIME) / 1e-3)
+    noise = np.random.default_rng(0).standard_normal((4, len(TIME)))
+    channels = {"piston/x [m]": (x, 1e-6), "piston/F [N]": (force, 0.2)}
+    channels |= {side: (p, 100.0) for side, p in zip(SIDES, (extend, retract), strict=True)}
+    pairs = zip(channels.items(), noise, strict=True)
+    return {name: y + sigma * e for (name, (y, sigma)), e in pairs}
+
+
+@pytest.mark.parametrize(
+    ("gauge", "crossed", "sign", "words"),
+    [
+        (
+            SIDES,
+            False,
+            1,
+            r"log: chamber/extend/P and chamber/retract/P count .*offset: \+101325 Pa",
+        ),
+        (SIDES[:1], False, 1, r"log: chamber/extend/P counts from .*offset: \+101325 Pa"),
+        ((), True, 1, "log: chamber/extend/P and chamber/retract/P are swapped; the force"),
+        (SIDES, True, 1, "are swapped and chamber/extend/P and chamber/retract/P count from"),
+        (SIDES[1:], False, -1, r"reversed sign \(.*\) and chamber/retract/P counts from another"),
+    ],
+)
+def test_pressures_above_the_air_or_swapped_are_named_before_any_effect(
+    gauge: tuple[str, ...], crossed: bool, sign: int, words: str, tmp_path: Path
+) -> None:
+    """What a seal's friction leaves of the force, too, is no friction of one direction."""
+    right, model = cylinder(12.0), rig_of(tmp_path)
+    read = {**right, "piston/F [N]": sign * right["piston/F [N]"]}
+    read |= {name: right[name] - 101325.0 for name in gauge}
+    if crossed:
+        read |= {name: read[other] for name, other in zip(SIDES, SIDES[::-1], strict=True)}
+    assert rig_problem([Trajectory(TIME, right, RUN)], model).validate() == []
+    with pytest.raises(BadData) as raised:
+        rig_problem([Trajectory(TIME, read, RUN)], model).validate()
+    assert re.search(words, str(raised.value)) and "; or " not in str(raised.value)
+
+
+def test_a_seal_rubs_against_the_motion_and_tells_the_end(tmp_path: Path) -> None:
+    right, model = cylinder(12.0), rig_of(tmp_path)
+    read = {**right, "piston/x [m]": 0.12 - right["piston/x [m]"]}
+    with pytest.raises(BadData, match=r"log: piston/x counts from the extended end .*; the force"):
+        rig_problem([Trajectory(TIME, read, RUN)], model).validate()
+
+
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        ("piston/x [m]", 10.0, r"moves by 599.9 mm; a stroke of 120 mm was expected; is its unit"),
+        ("piston/x [m]", 39.37, "moves by .* is its unit wrong"),
+        (
+            "piston/F [N]",
+            1 / 4.448,
+            "gain of piston/F would be off by more than any sensor.s is; its",
+        ),
+        ("chamber/retract/P [Pa]", 1.6, "gain of chamber/retract/P would be off"),
+    ],
+)
+def test_another_unit_is_no_effect(column: str, factor: float, words: str, tmp_path: Path) -> None:
+    """Decimetres and inches as metres, pounds as newtons, a bar that is none."""
+    rig_of(tmp_path)
+    log, read = tmp_path / "log.csv", cylinder(12.0)
+    Trajectory(TIME, {**read, column: factor * read[column]}, {"kind": "cylinder"}).write(log)
+    answer, _ = discover_logs([log], (), str(tmp_path / "model.yaml"))
+    assert not answer.writes and re.search(words, answer.sentence), answer.sentence
 
 
 def test_friction_and_small_zeros_are_no_mistakes() -> None:

@@ -1,11 +1,14 @@
 """Commands that are swapped or turned are named; without torques hips are left unknown."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from robot_logs import hops
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_log
+from kemba.identify.problem.types import Array
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -58,6 +61,35 @@ def test_mistakes_about_commands(mistake: str, logs: list[Trajectory]) -> None:
     change = {a: turned(logs[0][b]) for a, b in zip(columns, source, strict=True)}
     with pytest.raises(BadData, match=words):
         problem(taken(logs[0], change)).validate()
+
+
+def test_two_mistakes_about_commands(logs: list[Trajectory]) -> None:
+    read = {name: -logs[0][name] for name in TORQUES} | {FRONT[0]: 1.0 - logs[0][FRONT[0]]}
+    words = (
+        r"hip/tau of every leg has the reversed sign and valve/extend is inverted \(1 is on\) at"
+    )
+    with pytest.raises(BadData, match=words):
+        problem(taken(logs[0], read)).validate()
+
+
+@pytest.mark.parametrize(
+    ("columns", "change", "words"),
+    [
+        ([f"{leg}/hip/q" for leg in LEGS], np.negative, "hip/q of every leg has the reversed sign"),
+        (["rear/hip/q"], np.negative, "hip/q of the rear leg has the reversed sign; the log errs"),
+        (["front/piston/x"], lambda x: 0.07 - x, "piston/x of the front leg counts from the ext"),
+    ],
+)
+def test_a_flight_tells_mistakes_by_what_the_model_leaves(
+    columns: list[str], change: Callable[[Array], Array], words: str, logs: list[Trajectory]
+) -> None:
+    """No foot stands for long enough."""
+    air = (logs[0].time > 0.24) & (logs[0].time < 0.42)
+    read = dict(zip(logs[0].headers, (logs[0][name][air] for name in logs[0].names), strict=True))
+    flight = Trajectory(logs[0].time[air], read, logs[0].meta)
+    problem(flight).validate()
+    with pytest.raises(BadData, match=words):
+        problem(taken(flight, {name: change(flight[name]) for name in columns})).validate()
 
 
 def test_a_log_without_torques(logs: list[Trajectory], tmp_path) -> None:  # type: ignore[no-untyped-def]
