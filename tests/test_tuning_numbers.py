@@ -84,7 +84,7 @@ CONSTANTS = {  # file -> names, why
     "identify/rigs/rig_log.py": ("GAIN", "a Gaussian's cut"),
     "events.py": ("PLANNED", "what the solver's tolerance leaves of a closed gap"),
     "plant/kernel/machine.py": ("GAMMA", "coefficient of the integration scheme"),
-    "ocp/phases/radau.py": ("RADAU3 _R RADAU5", "coefficients of the integration schemes"),
+    "ocp/phases/radau.py": ("RADAU3 RADAU5 RADAU9", "stages of the integration schemes"),
     "identify/bench/prediction.py": ("V_NODES V_MIDDLE", "nodes of a Gauss-Hermite formula"),
     "identify/bench/clocks.py": ("OWNERS", "signs of a rate, by whose clock it is"),
     "identify/answer.py": ("FEW", "what a sentence has room for"),

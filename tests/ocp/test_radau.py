@@ -1,11 +1,15 @@
 """The collocation schemes: Radau IIA's order conditions, stage by stage and over a step."""
 
+import math
+
 import numpy as np
 import pytest
+from scipy.interpolate import pade
 
-from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
+from kemba.ocp.phases.radau import RADAU3, RADAU5, RADAU9, Scheme
 
-SCHEMES = pytest.mark.parametrize("scheme", [RADAU3, RADAU5], ids=["order 3", "order 5"])
+WAYS = [RADAU3, RADAU5, RADAU9]
+SCHEMES = pytest.mark.parametrize("scheme", WAYS, ids=lambda scheme: f"{scheme.stages} stages")
 
 
 @SCHEMES
@@ -29,8 +33,6 @@ def test_a_step_of_a_linear_equation_is_pades(scheme: Scheme) -> None:
         ones = np.ones(scheme.stages)
         inside = np.linalg.solve(np.eye(scheme.stages) - z * scheme.butcher, ones)
         growth = 1.0 + z * scheme.butcher[-1] @ inside
-        above, below = {
-            2: (1 + z / 3, 1 - 2 * z / 3 + z**2 / 6),
-            3: (1 + 2 * z / 5 + z**2 / 20, 1 - 3 * z / 5 + 3 * z**2 / 20 - z**3 / 60),
-        }[scheme.stages]
-        assert growth == pytest.approx(above / below, rel=1e-6, abs=1e-10)
+        taylor = [1.0 / math.factorial(k) for k in range(2 * scheme.stages)]
+        above, below = pade(taylor, scheme.stages, scheme.stages - 1)
+        assert growth == pytest.approx(above(z) / below(z), rel=1e-6, abs=1e-10)

@@ -75,11 +75,9 @@ def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]
 
 def _moved(log: RigLog, sign: float, zero: float, others: dict[str, Array]) -> RigLog:
     """A log whose position is sign * q + zero, with its other channels."""
-    c = log.channels
-    q, read = sign * c.q + zero, sign * c.read + zero
-    return replace(
-        log, channels=replace(c, q=q, v=sign * c.v, a=sign * c.a, read=read, others=others)
-    )
+    c, turned = log.channels, {n: sign * getattr(log.channels, n) for n in ("v", "a", "quick")}
+    moved = {n: sign * getattr(c, n) + zero for n in ("q", "read")}
+    return replace(log, channels=replace(c, others=others, **moved, **turned))
 
 
 def _zero(log: RigLog, others: dict[str, Array], left: Callable[[RigLog], float]) -> float:
