@@ -17,12 +17,7 @@ from kemba.ocp.task.task import Task
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute_many
 from kemba.runs import STAGES, load_run
-from kemba.sensitivity.replanned import (
-    FigureStep,
-    Replanned,
-    figures,
-    of_plan,
-)
+from kemba.sensitivity.replanned import FigureStep, Replanned, figures, of_plan
 from kemba.trajectory import Trajectory
 
 NAN = float("nan")

@@ -112,11 +112,7 @@ class PlanCandidate:
 
 
 def best_plan(
-    task: Task,
-    document: Document,
-    approach: Approach,
-    listener: Listener,
-    place: str = "",
+    task: Task, document: Document, approach: Approach, listener: Listener, place: str = ""
 ) -> Trial:
     """The plan of a task, executed and judged: the first good one, or the best of all tried.
 

@@ -178,11 +178,7 @@ def _values(requirement: Requirement, plan: Trajectory) -> Array | None:
 
 
 def _worst(
-    requirement: Requirement,
-    values: Array,
-    time: Array,
-    allowed: float,
-    nodes: Array | None = None,
+    requirement: Requirement, values: Array, time: Array, allowed: float, nodes: Array | None = None
 ) -> MeasuredRequirement:
     """The value furthest beyond the limits of a requirement, or nearest to them."""
     beyond = np.maximum(requirement.lower - values, values - requirement.upper)

@@ -26,11 +26,7 @@ def duration(model: Model, u: ca.SX, h: ca.SX) -> ca.SX:
     return h
 
 
-COSTS: dict[str, Cost] = {
-    "torque_squared": torque_squared,
-    "air": air,
-    "duration": duration,
-}
+COSTS: dict[str, Cost] = {"torque_squared": torque_squared, "air": air, "duration": duration}
 
 
 def running(
