@@ -51,12 +51,9 @@ def _headers(stream: TextIO, path: str | Path) -> list[str]:
             str(path), "is empty", "a header row starting with 'time [s]' was expected"
         )
     if ";" in line and "," not in line:
-        raise KembaError(
-            f"{path}:1",
-            "is separated by semicolons",
-            "commas, and decimal points, were expected",
-            map_hint(path),
-        )
+        what = "is separated by semicolons"
+        expected = "commas, and decimal points, were expected"
+        raise KembaError(f"{path}:1", what, expected, map_hint(path))
     return [cell.strip() for cell in _cells(line)]
 
 

@@ -285,11 +285,6 @@ class Check:
         """Its name in words: `off is absent`."""
         return self.run.__name__.replace("_", " ")
 
-    @property
-    def doc(self) -> str:
-        """What is promised, in one sentence."""
-        return (self.run.__doc__ or "").split("\n")[0]
-
 
 @dataclass(frozen=True)
 class CheckResult:

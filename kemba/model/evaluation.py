@@ -62,11 +62,9 @@ def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Insta
         legs: Iterable[str | None] = (None,) if effect.place == "body" else mechanism.legs
         if effect.leg is not None:
             if effect.leg not in mechanism.legs:
-                raise KembaError(
-                    f"effects.{effect.name}",
-                    f"{mechanism.name} has no leg '{effect.leg}'",
-                    hint=suggest(effect.leg, filter(None, mechanism.legs)),
-                )
+                what = f"{mechanism.name} has no leg '{effect.leg}'"
+                hint = suggest(effect.leg, filter(None, mechanism.legs))
+                raise KembaError(f"effects.{effect.name}", what, hint=hint)
             legs = (effect.leg,)
         for leg in legs:
             if gone & {(effect.kind, None), (effect.kind, leg)}:
@@ -80,11 +78,9 @@ def _check_ports(mechanism: Mechanism, effect: Effect, leg: str | None) -> None:
     for alias in effect.ports:
         name = port_name(leg, alias)
         if name not in mechanism.ports:
-            raise KembaError(
-                f"effects.{effect.name}",
-                f"needs the port '{name}', which {mechanism.name} does not have",
-                hint=f"ports: {', '.join(mechanism.ports)}",
-            )
+            what = f"needs the port '{name}', which {mechanism.name} does not have"
+            hint = f"ports: {', '.join(mechanism.ports)}"
+            raise KembaError(f"effects.{effect.name}", what, hint=hint)
 
 
 def port_name(leg: str | None, alias: str) -> str:
@@ -194,11 +190,9 @@ class Evaluation:
         for instance in self.instances:
             for name, signal in instance.effect.signals(self.at(instance.leg)).items():
                 if name not in heard:
-                    raise KembaError(
-                        f"effects.{instance.effect.name}",
-                        f"changes the signal '{name}', which no effect of this model reads",
-                        hint="add the effect it acts on, or remove it",
-                    )
+                    what = f"changes the signal '{name}', which no effect of this model reads"
+                    hint = "add the effect it acts on, or remove it"
+                    raise KembaError(f"effects.{instance.effect.name}", what, hint=hint)
                 found.setdefault((instance.leg, name), []).append(signal)
         for (leg, name), signals in found.items():
             if sum(s.lagged is not None for s in signals) > 1:

@@ -221,13 +221,8 @@ def plan(
 
 def spent(old: Plan, new: Plan) -> Plan:
     """A plan with the solves and times up to a later one."""
-    return replace(
-        old,
-        attempts=new.attempts,
-        solve_s=new.solve_s,
-        solve_cpu_s=new.solve_cpu_s,
-        build_s=new.build_s,
-    )
+    taken = ("attempts", "solve_s", "solve_cpu_s", "build_s")
+    return replace(old, **{name: getattr(new, name) for name in taken})
 
 
 def check_feasible(

@@ -203,9 +203,7 @@ def _samples(duration: float, sample: float | Array) -> Array:
     if np.ndim(sample):
         return np.asarray(sample, dtype=float)
     times = np.arange(int(duration / float(sample) + 1e-6) + 1) * float(sample)
-    if duration - times[-1] > SAME_TIME:
-        return np.append(times, duration)
-    return np.append(times[:-1], duration)
+    return np.append(times[times < duration - SAME_TIME], duration)
 
 
 _STARTED: list[subprocess.Popen[bytes]] = []  # nobody waits for it: the kernel's lock does

@@ -3,7 +3,6 @@
 https://rerun.io; `rerun-sdk` is imported when a recording is asked for.
 """
 
-import json
 from collections.abc import Iterator
 from html import escape
 from pathlib import Path
@@ -14,10 +13,11 @@ import numpy as np
 
 import kemba
 from kemba.errors import KembaError
-from kemba.files import atomic_path, atomic_text, plain
+from kemba.files import atomic_path, atomic_text
 from kemba.folders import fresh, place_for
 from kemba.logs import load_map
 from kemba.plotting.source import CYLINDER, Pose, Source, load_source, machine_of, poses
+from kemba.report.charts import script_text
 from kemba.trajectory import Array
 
 PAGES = Path(__file__).parent / "pages"
@@ -76,12 +76,6 @@ def stage(
         viewer=page_text("viewer.js"),
         scene=script_text(shown),
     )
-
-
-def script_text(data: dict[str, Any]) -> str:
-    """Data as JSON that can stand within a script: no name in it can end the script."""
-    text = json.dumps(plain(data), separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c")
 
 
 def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:

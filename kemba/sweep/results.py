@@ -143,12 +143,8 @@ def spread(values: Iterable[float]) -> dict[str, float] | None:
     numbers = np.array(list(values), dtype=float)
     if not len(numbers):
         return None
-    return {
-        "min": float(numbers.min()),
-        "median": float(np.median(numbers)),
-        "p90": float(np.percentile(numbers, 90)),
-        "max": float(numbers.max()),
-    }
+    low, median, p90, high = np.percentile(numbers, [0, 50, 90, 100]).tolist()
+    return {"min": low, "median": median, "p90": p90, "max": high}
 
 
 def _column(rows: Rows, name: str) -> list[float]:

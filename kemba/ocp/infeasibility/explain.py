@@ -49,12 +49,10 @@ def explanation(
     transcription, Y = outcome.transcription, outcome.point.Y
     trajectory = to_trajectory(transcription, Y)
     limits = active_limits(task, model, trajectory)
+    asked = ((r, by, r.upper if by > 0 else r.lower) for r, by, _ in outcome.given)
     given = one_per_requirement(
-        relax(
-            document, requirement, asked, 1.0 - asked if requirement.quantity.binary else asked + by
-        )
-        for requirement, by, _ in outcome.given
-        for asked in [requirement.upper if by > 0 else requirement.lower]
+        relax(document, r, end, 1.0 - end if r.quantity.binary else end + by)
+        for r, by, end in asked
     )
     if given:
         time = f" within {trajectory.time[-1]:.2f} s"
@@ -142,12 +140,9 @@ def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
     stance = np.flatnonzero(_stance(model, trajectory))
     if not len(stance):
         return
-    full = {
-        leg: bool(
-            trajectory[f"{leg}/piston/x"][: stance[-1] + 2].max() > FULL * model.mechanism.stroke
-        )
-        for leg in model.mechanism.legs
-    }
+    pushing, least = slice(stance[-1] + 2), FULL * model.mechanism.stroke
+    legs = model.mechanism.legs
+    full = {leg: bool(trajectory[f"{leg}/piston/x"][pushing].max() > least) for leg in legs}
     if any(full.values()):
         yield f"{_legs(model, full)} pistons use their whole stroke"
 

@@ -101,10 +101,9 @@ def resolve(
 def _loose(requirement: Requirement, states: AbstractSet[str]) -> float:
     """How far a plan on nodes may miss a force of air that is asked for under way: it depends on
     when valves switch, to less than a step."""
-    fixed = requirement.lower == requirement.upper and requirement.at not in (None, 0.0)
-    return (
-        AIR * requirement.quantity.scale if fixed and requirement.quantity.name in states else 0.0
-    )
+    quantity, later = requirement.quantity, requirement.at not in (None, 0.0)
+    fixed = later and requirement.lower == requirement.upper
+    return AIR * quantity.scale if fixed and quantity.name in states else 0.0
 
 
 def _cost_errors(

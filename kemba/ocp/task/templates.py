@@ -61,20 +61,16 @@ def _clear_swings(task: Task, model: Model) -> list[Requirement]:
     assert task.clearance is not None
     known, found = quantities(model), []
     for leg in model.mechanism.legs:
-        parts = [
-            (leg in part.on, *span)
-            for part, span in zip(task.contacts, spans(task.contacts), strict=True)
-        ]
-        for stands, run in itertools.groupby(parts, operator.itemgetter(0)):
-            own = list(run)
-            begin, end = own[0][1], own[-1][2]
-            if not stands:
-                middle, half = (begin + end) / 2, FLIGHT * (end - begin) / 2
-                during = middle - half, middle + half
-                gap = known[f"{leg}/foot/gap"]
-                found.append(
-                    Requirement(("clearance",), gap, None, task.clearance, math.inf, during)
-                )
+        gap, stands = known[f"{leg}/foot/gap"], [leg in part.on for part in task.contacts]
+        parts = zip(stands, spans(task.contacts), strict=True)
+        for on, run in itertools.groupby(parts, operator.itemgetter(0)):
+            own = [span for _, span in run]
+            begin, end = own[0][0], own[-1][1]
+            middle, half = (begin + end) / 2, FLIGHT * (end - begin) / 2
+            during = middle - half, middle + half
+            if not on:
+                asked = Requirement(("clearance",), gap, None, task.clearance, math.inf, during)
+                found.append(asked)
     return found
 
 

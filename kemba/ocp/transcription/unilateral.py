@@ -83,10 +83,8 @@ def _friction(node: Node, rows: dict[str, int], owner: str) -> Friction | None:
 
 
 def _place(node: Node, expression: ca.SX) -> int | None:
-    for i in range(node.lam.numel()):
-        if ca.is_equal(expression, node.lam[i]):
-            return i
-    return None
+    places = range(node.lam.numel())
+    return next((i for i in places if ca.is_equal(expression, node.lam[i])), None)
 
 
 def _is_gap(node: Node, expression: ca.SX) -> bool:
