@@ -277,9 +277,7 @@ class Trajectory:
 
     def write(self, path: str | Path) -> None:
         """Write a CSV to `path`, and the sidecar when there is metadata; reading it back is exact.
-
-        Raises KembaError when the times are not strictly increasing.
-        """
+        Raises KembaError when the times are not strictly increasing."""
         check_times(self.time, str(path), first_row=2)
         texts = [_texts(self.time), *(_texts(values) for values in self._columns.values())]
         with atomic_text(path) as stream:

@@ -105,9 +105,7 @@ def to_si(value: float | int | str, unit: str) -> float:
 
 def convert(value: Number, source_unit: str, target_unit: str) -> Number:
     """`value` (a float or an array of any shape) in `source_unit`, expressed in `target_unit`.
-
-    Raises ValueError when a unit is unknown or the dimensions differ.
-    """
+    Raises ValueError when a unit is unknown or the dimensions differ."""
     if source_unit == target_unit:
         return value
     si, size = USUAL.get(source_unit, ("", 1.0))
@@ -125,9 +123,7 @@ def convert(value: Number, source_unit: str, target_unit: str) -> Number:
 
 def read_si(value: float | int | str) -> tuple[float, str]:
     """Number and SI unit of a value of any dimension: `'5 mm'` is (0.005, 'm'), 3 is (3.0, '1').
-
-    Raises ValueError, in words for the author of the file.
-    """
+    Raises ValueError, in words for the author of the file."""
     if not isinstance(value, str):
         return to_si(value, "1"), "1"
     number, written = _split(value.strip(), "1")

@@ -93,9 +93,7 @@ def load_model(name: Path_ = "planning", supply: float | None = None) -> Model:
 
 def load_log(path: Path_, columns: ColumnMap | Path_ | None = None) -> Trajectory:
     """The log at `path`, of any format of `docs/logs.md`; `columns` is a column map or its file.
-
-    Raises KembaError with row and column of the first fault.
-    """
+    Raises KembaError with row and column of the first fault."""
     known = columns is None or isinstance(columns, ColumnMap)
     return read_log(path, columns if known else load_map(columns))  # type: ignore[arg-type]
 

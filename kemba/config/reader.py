@@ -26,10 +26,8 @@ LONGEST_NUMBER = 40  # digits and signs; a float has 17 that count
 
 
 def resolve(text: str) -> tuple[str, Any]:
-    """The kind of a plain scalar (`null`, `bool`, `int`, `float` or `str`) and its value.
-
-    Raises ValueError, in words for the author, for numbers that no float can hold.
-    """
+    """The kind of a plain scalar (`null`, `bool`, `int`, `float` or `str`) and its value. Raises
+    ValueError, in words for the author, for numbers that no float can hold."""
     kind = next((name for name, pattern in PATTERNS.items() if pattern.fullmatch(text)), "str")
     if kind in ("int", "float") and len(text) > LONGEST_NUMBER:
         raise ValueError(f"this number has {len(text)} characters; {LONGEST_NUMBER} are allowed")
@@ -147,11 +145,8 @@ class _Builder:
         self.count = self.aliases = 0
 
     def tree(self, text: str) -> Tree | None:
-        """The tree of the one document; None when the text is empty.
-
-        Raises YamlError where the text is not valid YAML, goes beyond the limits, or holds a second
-        document.
-        """
+        """The tree of the one document; None when the text is empty. Raises YamlError where the
+        text is not valid YAML, goes beyond the limits, or holds a second document."""
         for event in _events(text):
             mark = (event.start_mark.line, event.start_mark.column)
             name = type(event).__name__

@@ -128,10 +128,8 @@ class Evaluation:
         return _Place(self, leg)
 
     def contribution(self, index: int) -> Contribution:
-        """What instance `index` adds; evaluated once.
-
-        Raises KembaError where the effect reads a value that depends on itself.
-        """
+        """What instance `index` adds; evaluated once. Raises KembaError where the effect reads a
+        value that depends on itself."""
         if index not in self._contributions:
             if index in self._busy:
                 raise KembaError(self.instances[index].label, "reads a value that depends on it")
@@ -142,10 +140,8 @@ class Evaluation:
         return self._contributions[index]
 
     def lookup(self, leg: str | None, symbol: str) -> Any:
-        """Value of a symbol as seen from `leg`: a signal, a variable, or a published value.
-
-        Raises KembaError where nothing gives it.
-        """
+        """Value of a symbol as seen from `leg`: a signal, a variable, or a published value. Raises
+        KembaError where nothing gives it."""
         if symbol in self.slots or (leg, symbol) in self.inputs:
             return self.signal(leg, symbol)
         for place in (leg, None):

@@ -246,10 +246,8 @@ def check_feasible(
 
 
 def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
-    """Variables and rows of the whole program of a task, everything checked, nothing solved.
-
-    Raises KembaError as `check_feasible` does.
-    """
+    """Variables and rows of the whole program of a task, everything checked, nothing solved. Raises
+    KembaError as `check_feasible` does."""
     built, requirements = check_feasible(task, document, model)
     if task.sequence:
         task, built, requirements = as_one(task, document)

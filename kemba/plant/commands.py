@@ -113,10 +113,8 @@ def find_input(model: Model, name: str, where: str) -> int:
 
 
 def input_table(model: Model, profiles: Mapping[str, Profile], times: Array) -> Array:
-    """Values (m, nu) from each of `times` (m,) [s] on; NaN where no profile says them.
-
-    Raises KembaError on unknown names.
-    """
+    """Values (m, nu) from each of `times` (m,) [s] on; NaN where no profile says them. Raises
+    KembaError on unknown names."""
     table = np.full((len(times), len(model.inputs)), np.nan)
     for name, profile in profiles.items():
         table[:, find_input(model, name, model.name)] = profile.at(times)

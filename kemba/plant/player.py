@@ -78,10 +78,8 @@ class Player:
         self._inputs = {name: i for i, name in enumerate(input_names(model))}
 
     def play(self, step: float | None) -> None:
-        """Fill the record, in steps of up to `step` [s]; None: as long as the motion allows.
-
-        Raises KembaError.
-        """
+        """Fill the record, in steps of up to `step` [s]; None: as long as the motion allows. Raises
+        KembaError."""
         if step is None:
             pace = Pace(np.array([FIRST_STEP]), SHORTEST_STEP, LONGEST_STEP, TOLERANCE)
         else:

@@ -186,9 +186,7 @@ class Rig(Section):
 
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
         """The tests in order, of a cylinder of `stroke` [m]; random ones are drawn from `rng`.
-
-        Raises KembaError where a position lies beyond the stroke.
-        """
+        Raises KembaError where a position lies beyond the stroke."""
         raise NotImplementedError
 
     @property

@@ -63,10 +63,8 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
 
 
 def lowest_foot(model: Model, values: Mapping[str, float]) -> float:
-    """Height [m] of the lowest foot above its ground in the pose of `initial_values`.
-
-    Raises KembaError likewise.
-    """
+    """Height [m] of the lowest foot above its ground in the pose of `initial_values`. Raises
+    KembaError likewise."""
     return _lowest_foot(model, initial_values(model, values)[0])
 
 
@@ -125,9 +123,7 @@ class Condition:
 
 def simulate(model: Model, *arguments: Any, **named: Any) -> Trajectory:
     """The motion with every output, state, input and force; arguments are those of `Condition`.
-
-    Raises KembaError on unknown names and on models without free motion.
-    """
+    Raises KembaError on unknown names and on models without free motion."""
     return run(model, *arguments, **named).trajectory
 
 

@@ -177,11 +177,8 @@ class Builder:
 
 
 def course_of(model: Model, table: Trajectory) -> EventCourse:
-    """The linearised execution of a controller table.
-
-    Raises KembaError where the table cannot be simulated, ValueError for a model with other pairs
-    than rigid contacts and stops.
-    """
+    """The linearised execution of a controller table. Raises KembaError where the table cannot be
+    simulated, ValueError for a model with other pairs than rigid contacts and stops."""
     table, hybrid = read_controller(table), Hybrid(model)
     condition, begin = condition_of(table, model)
     commands, last = condition.commands, condition.duration

@@ -59,10 +59,8 @@ def shown(
 def stage(
     source: Source, model: str | None = None, ghost: Source | None = None, name: str = ""
 ) -> str:
-    """The viewer with its scene as HTML; `ghost`: a second motion, drawn pale.
-
-    Raises KembaError when columns are missing.
-    """
+    """The viewer with its scene as HTML; `ghost`: a second motion, drawn pale. Raises KembaError
+    when columns are missing."""
     shown = scene(source, model, ghost)
     who = f"Shown: {name or source.name}."
     if ghost is not None:
@@ -79,10 +77,8 @@ def stage(
 
 
 def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:
-    """Times [s]; of every robot points [m], valves and contacts; the size [m] of it all.
-
-    Raises KembaError where columns are missing.
-    """
+    """Times [s]; of every robot points [m], valves and contacts; the size [m] of it all. Raises
+    KembaError where columns are missing."""
     machine = machine_of(source, model)
     times = _times(source, ghost)
     shown = [poses(one, machine, times) for one in (source, ghost) if one and not one.bench]

@@ -9,10 +9,8 @@ from kemba.runs import STAGES, load_run
 
 
 def origin_of(run: str | Path) -> Origin:
-    """Plan, model and requirements of a run folder.
-
-    Raises KembaError where the folder is no run, has no plan, or its model is gone.
-    """
+    """Plan, model and requirements of a run folder. Raises KembaError where the folder is no run,
+    has no plan, or its model is gone."""
     found = load_run(run)
     plan = found.trajectory
     task, document = load_task(found.task)

@@ -33,10 +33,8 @@ from kemba.trajectory import Trajectory
 
 
 def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
-    """The cases of a block; its plan is made first where it is missing.
-
-    Raises KembaError where a condition does not fit the model.
-    """
+    """The cases of a block; its plan is made first where it is missing. Raises KembaError where a
+    condition does not fit the model."""
     task = _task_data(expansion, name, block)
     plant, planned = model_name(expansion, block.plant), model_name(expansion, task["model"])
     made_for = {key: task[key] for key in ("supply", "payload") if task.get(key) is not None}

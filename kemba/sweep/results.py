@@ -185,10 +185,8 @@ FIGURES = (
 
 
 def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Path:
-    """The folder of a sweep, `sweeps/<name>` by default; an existing one is continued.
-
-    Raises KembaError when it holds something else, or another sweep.
-    """
+    """The folder of a sweep, `sweeps/<name>` by default; an existing one is continued. Raises
+    KembaError when it holds something else, or another sweep."""
     path = Path("sweeps") / sweep.name if out is None else Path(out)
     manifest = path / MANIFEST
     if path.exists() and not path.is_dir():

@@ -133,10 +133,8 @@ def elastic(
     reduction: Reduction,
     session: Session,
 ) -> Outcome | None:
-    """Solve the task with soft requirements on a coarse grid; None when even that failed.
-
-    Raises Stopped when the user stopped it.
-    """
+    """Solve the task with soft requirements on a coarse grid; None when even that failed. Raises
+    Stopped when the user stopped it."""
     deadline = min(session.control.deadline, time.monotonic() + BUDGET)
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}

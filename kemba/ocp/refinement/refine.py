@@ -264,10 +264,8 @@ class Refiner:
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The program of some phases and its start (size,), scaled.
-
-        Raises ValueError for a model to which the method does not apply.
-        """
+        """The program of some phases and its start (size,), scaled. Raises ValueError for a model
+        to which the method does not apply."""
         constraints = read_constraints(self.model, self.reduction)
         program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic

@@ -205,10 +205,8 @@ HELD = ("u", "lam", "h")  # act on the interval before a node
 
 
 def resumed(transcription: Transcription, trajectory: Trajectory) -> Iterate:
-    """The trajectory as a point of the program; another number of nodes is interpolated.
-
-    Raises KembaError when the trajectory lacks a column of the model.
-    """
+    """The trajectory as a point of the program; another number of nodes is interpolated. Raises
+    KembaError when the trajectory lacks a column of the model."""
     t = transcription
     groups = node_groups(t.model, trajectory)
     at = np.linspace(0.0, len(trajectory) - 1, t.nodes + 1)

@@ -43,10 +43,8 @@ class NotGivenError(ValueError):
 def resolve(
     task: Task, model: Model, document: Document, partial: bool = False
 ) -> list[Requirement]:
-    """All requirements of a task. `partial`: nothing is said of what the task does not give.
-
-    Raises ConfigErrors with every wrong name, unit or range, of its costs and solver options too.
-    """
+    """All requirements of a task. `partial`: nothing is said of what the task does not give. Raises
+    ConfigErrors with every wrong name, unit or range, of its costs and solver options too."""
     known, task = quantities(model), with_height(task, model)
     requirements: list[Requirement] = []
     errors: list[KembaError] = []

@@ -76,9 +76,7 @@ def _clear_swings(task: Task, model: Model) -> list[Requirement]:
 
 def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
     """Every foot as high above the ground as the task's `feet`, at the highest goal of the body.
-
-    Raises ValueError where there is no such goal.
-    """
+    Raises ValueError where there is no such goal."""
     apex = highest(others)
     if task.feet is None:
         return []
@@ -92,10 +90,8 @@ def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> lis
 
 
 def standing_feet(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
-    """The feet of every part of `contacts` on the ground, the others without force.
-
-    Raises ValueError where a part names a leg that there is not, or shares do not add up.
-    """
+    """The feet of every part of `contacts` on the ground, the others without force. Raises
+    ValueError where a part names a leg that there is not, or shares do not add up."""
     if not task.contacts:
         return []
     legs, known, found = model.mechanism.legs, quantities(model), []
@@ -111,10 +107,8 @@ def standing_feet(task: Task, model: Model, others: Sequence[Requirement]) -> li
 
 
 def closed_in_itself(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
-    """Every coordinate, rate, force of air and valve at the end as at the start.
-
-    Raises ValueError where `except` names what there is not.
-    """
+    """Every coordinate, rate, force of air and valve at the end as at the start. Raises ValueError
+    where `except` names what there is not."""
     if task.periodic is None:
         return []
     excepted = task.periodic.excepted

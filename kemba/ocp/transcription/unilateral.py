@@ -34,10 +34,8 @@ class Constraint:
 
 
 def read_constraints(model: Model, reduction: Reduction) -> list[Constraint]:
-    """The constraints of a model that its half (or whole) problem keeps.
-
-    Raises ValueError where a pair is neither a gap with a force nor the friction of one.
-    """
+    """The constraints of a model that its half (or whole) problem keeps. Raises ValueError where a
+    pair is neither a gap with a force nor the friction of one."""
     found = rigid_constraints(model, reduction)
     covered = sum(4 if c.friction else 1 for c in found)
     if covered != len(reduction.pairs):
