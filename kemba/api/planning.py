@@ -180,14 +180,9 @@ def plan(
         models.insert(0, find_config(task, "tasks"))
     files = [*dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, files, ["kemba.plan"])
-    answer = solve_into(
-        folder,
-        resolved,
-        document,
-        Listener(progress or watched()),
-        Approach(starts=starts, replay=replay, cold=cold, memory=memory),
-        figure=False,
-    )
+    approach = Approach(starts=starts, replay=replay, cold=cold, memory=memory)
+    listener = Listener(progress or watched())
+    answer = solve_into(folder, resolved, document, listener, approach, figure=False)
     return Planned(folder.path, answer)
 
 

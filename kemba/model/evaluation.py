@@ -43,10 +43,8 @@ class Instance:
 
     def variables(self, role: str) -> dict[Key, Quantity]:
         """Its `states`, `inputs` or `forces`, under their full column names."""
-        found = {}
-        for symbol, quantity in getattr(self.effect, role)().items():
-            found[(self.leg, symbol)] = replace(quantity, name=full_name(self.leg, quantity.name))
-        return found
+        own = getattr(self.effect, role)()
+        return {(self.leg, s): replace(q, name=full_name(self.leg, q.name)) for s, q in own.items()}
 
 
 def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Instance]:

@@ -209,10 +209,5 @@ def _fault(t: Trajectory, machine: Machine, plan: Trajectory | None) -> str | No
 
 def marks_of(listed: Sequence[Events | None]) -> list[tuple[float, int]]:
     """Touchdowns as vertical lines: time [s] and the number of the motion."""
-    return [
-        (round(time, 4), i)
-        for i, events in enumerate(listed)
-        if events
-        for times in events.touchdowns.values()
-        for time in times
-    ]
+    each = ((i, times) for i, e in enumerate(listed) if e for times in e.touchdowns.values())
+    return [(round(time, 4), i) for i, times in each for time in times]

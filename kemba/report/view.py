@@ -67,13 +67,8 @@ def stage(
         who += f" Pale blue: {'the plan' if ghost.plan else ghost.name}."
     high = max(centre[1] for centre in shown["motions"][0]["centres"])
     alt = f"{who} The robot in 3-D from the side; its body rises to {high:.2f} m."
-    return fill(
-        "stage.html",
-        who=escape(who),
-        alt=escape(alt),
-        viewer=page_text("viewer.js"),
-        scene=script_text(shown),
-    )
+    code = {"viewer": page_text("viewer.js"), "scene": script_text(shown)}
+    return fill("stage.html", who=escape(who), alt=escape(alt), **code)
 
 
 def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:

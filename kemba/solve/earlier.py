@@ -15,10 +15,5 @@ def origin_of(run: str | Path) -> Origin:
     plan = found.trajectory
     task, document = load_task(found.task)
     model = task_model(task)
-    return Origin(
-        plan,
-        model,
-        tuple(resolve(task, model, document)),
-        stages=read_stages(found.path / STAGES),
-        run=str(run),
-    )
+    asked, stages = tuple(resolve(task, model, document)), read_stages(found.path / STAGES)
+    return Origin(plan, model, asked, stages=stages, run=str(run))

@@ -198,15 +198,8 @@ def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Pat
                 f"holds the sweep '{known['sweep']}'" if "sweep" in known else "holds other files"
             )
             raise KembaError(f"--out {path}", what, hint="give another --out")
-    facts = {
-        "sweep": sweep.name,
-        "status": "running",
-        "command": sys.argv,
-        "started": now(),
-        "machine": machine(),
-        "versions": versions(),
-    }
-    write_json(manifest, facts)
+    facts = {"sweep": sweep.name, "status": "running", "command": sys.argv, "started": now()}
+    write_json(manifest, {**facts, "machine": machine(), "versions": versions()})
     dump_yaml(document.data, path / "sweep.yaml")
     return path
 

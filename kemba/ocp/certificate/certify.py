@@ -113,13 +113,8 @@ class Measurement:
         now = {name: values[1:] for name, values in x.items()}
         at = (now["q"], now["v"], rates[0], now["s"], rates[1], now["lam"], now["u"])
         parts = model.node.residual.map(len(h))(*(m.T for m in at), [])
-        self.residual = dict(
-            zip(
-                ("dynamics", "rate", "pair_a", "pair_b", "limits"),
-                (np.array(part).T for part in parts),
-                strict=True,
-            )
-        )
+        names = ("dynamics", "rate", "pair_a", "pair_b", "limits")
+        self.residual = {n: np.array(p).T for n, p in zip(names, parts, strict=True)}
 
     def note(self, values: np.ndarray, labels: Iterable[Label], first: int = 1) -> float:
         """Keep the worst of every column of scaled violations (nodes, rows), whose nodes begin at

@@ -3,6 +3,7 @@ plan reaches, in words."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -80,13 +81,8 @@ STEPS = 0.8  # part of the steps at a bound that is named
 
 def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
     """Parts of a sentence: `front and rear extension valves are open throughout the push`."""
-    return [
-        *_valves(model, trajectory),
-        *_torques(model, trajectory),
-        *_strokes(model, trajectory),
-        *_grip(model, trajectory),
-        *_steps(task, trajectory),
-    ]
+    of_robot = (part(model, trajectory) for part in (_valves, _torques, _strokes, _grip))
+    return [*chain.from_iterable(of_robot), *_steps(task, trajectory)]
 
 
 def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:

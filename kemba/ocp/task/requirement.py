@@ -128,11 +128,8 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
 
 def highest(requirements: Sequence[Requirement]) -> Requirement | None:
     """The goal, or without one the end, that asks for the greatest height of the body, or None."""
-    high = [
-        w
-        for w in requirements
-        if w.quantity.name == "body/z" and w.at and w.lower > -math.inf and w.minus is None
-    ]
+    heights = (w for w in requirements if w.quantity.name == "body/z" and w.minus is None)
+    high = [w for w in heights if w.at and w.lower > -math.inf]
     goals = [w for w in high if w.location[0] == "goals"]
     return max(goals or high, key=lambda w: w.lower, default=None)
 
