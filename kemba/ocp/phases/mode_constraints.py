@@ -16,7 +16,7 @@ from kemba.ocp.phases.settings import ModeConstraints
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.transcription.first_node import state_rows
 from kemba.ocp.transcription.stage import aim_cost, as_variable, tighter_bounds
-from kemba.ocp.transcription.unilateral import Constraint, Friction
+from kemba.ocp.transcription.unilateral import Constraint
 
 AGREES = 1e-4  # of a scaled quantity; a dependent equality with another value contradicts the rest
 STEPS = 10  # of Gauss and Newton to a point on the equalities
@@ -193,21 +193,16 @@ def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint)
     forces: Where = [
         (p, np.concatenate([at[g] for g in own.split()])) for p, at in (*stages, *hits)
     ]
-    weight = program.model.mechanism.weight
+    weight, places = program.model.mechanism.weight, constraint.friction
+    tangential = program.model.node.lam[[places.forward, places.backward]]
     edges = (("forward", constraint.friction.cone_forward, BACK),
              ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
     for way, cone, sliding in edges:
-        most = ca.substitute(cone, _tangential(program, constraint.friction), ca.SX.zeros(2))
+        most = ca.substitute(cone, tangential, ca.SX.zeros(2))
         held = view.of(cone - (1.0 - program.task.grip) * most) / weight
         for wanted, g, high in ((HELD, held, INF), (sliding, view.of(cone) / weight, 0.0)):
             where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
             program.mode_constraint(i, f"cone {way}", view.z(own), g, 0.0, high, where)
-
-
-def _tangential(program: PhaseProgram, friction: Friction) -> ca.SX:
-    """Both parts (2,) of a contact's friction among the forces of the node."""
-    lam = program.model.node.lam
-    return ca.vertcat(lam[friction.forward], lam[friction.backward])
 
 
 def _start(

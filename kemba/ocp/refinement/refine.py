@@ -94,16 +94,15 @@ def refine(
     task: Task,
     requirements: Sequence[Requirement],
     plan: Trajectory,
-    reduction: Reduction | None = None,
     control: Control | None = None,
     tell: Tell = silent,
 ) -> Refined:
     """The plan solved again with its modes kept and the durations of its phases free.
 
-    `reduction`: half or whole robot; by default the half where plan and task allow it. `tell` gets
-    the name of every solve.
+    It is solved by half the robot where plan and task allow it. `tell` gets the name of every
+    solve.
     """
-    reduction = reduction or reduction_of(model, task, requirements, plan)
+    reduction = reduction_of(model, task, requirements, plan)
     refiner = Refiner(model, task, requirements, plan, reduction, control or Control(), tell)
     try:
         return refiner.run()
