@@ -80,39 +80,34 @@ def guarded(verb: Callable[..., None]) -> Callable[..., None]:
             verb(*args, **options)
         except (typer.Exit, typer.Abort, typer.BadParameter):
             raise
-        except KembaError as error:
-            typer.echo(str(error), err=True)
-            raise typer.Exit(_code(error)) from None
-        except KeyboardInterrupt:
-            typer.echo("interrupted", err=True)
-            raise typer.Exit(INTERRUPTED) from None
-        except Exception as error:
+        except (Exception, KeyboardInterrupt) as error:
             if isinstance(error, OSError) and error.errno == errno.EPIPE:
                 raise  # the reader of our output has closed it; click exits without a message
-            if isinstance(error, OSError) and error.errno in OF_THE_DISK:
-                typer.echo(_disk(error), err=True)
-                raise typer.Exit(BAD_ANSWER) from None
-            typer.echo(used_up(error) or _crash(error), err=True)
-            raise typer.Exit(BAD_ANSWER) from None
+            text, code = _told(error)
+            typer.echo(text, err=True)
+            raise typer.Exit(code) from None
 
     return run
 
 
-def _code(error: KembaError) -> int:
-    """The command was right when only the disk is full."""
-    from kemba.files import DiskFull
+def _told(error: BaseException) -> tuple[str, int]:
+    """The message on an error, and the exit code."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", INTERRUPTED
+    if isinstance(error, KembaError):
+        from kemba.files import DiskFull
 
-    return BAD_ANSWER if isinstance(error, DiskFull) else BAD_INPUT
+        # the command was right when only the disk is full
+        return str(error), BAD_ANSWER if isinstance(error, DiskFull) else BAD_INPUT
+    if isinstance(error, OSError) and error.errno in OF_THE_DISK:
+        from kemba.files import write_error
+
+        # without a name it was our own output
+        return str(write_error(error.filename or "the output", error)), BAD_ANSWER
+    return used_up(error) or _crash(error), BAD_ANSWER
 
 
-def _disk(error: OSError) -> str:
-    """A failed write in words; without a name it was our own output."""
-    from kemba.files import write_error
-
-    return str(write_error(error.filename or "the output", error))
-
-
-def _crash(error: Exception) -> str:
+def _crash(error: BaseException) -> str:
     """The message on an unexpected exception: short, or the traceback with KEMBA_DEBUG."""
     whole = "".join(traceback.format_exception(error))
     if os.environ.get("KEMBA_DEBUG") or loud.get():

@@ -29,10 +29,8 @@ CALLED = {"maps": "column map"}
 
 
 def schema_of(kind: str) -> type[BaseModel]:
-    """The pydantic model of a kind of file.
-
-    Raises KembaError where there is no such kind, with the nearest one.
-    """
+    """The pydantic model of a kind of file. Raises KembaError where there is no such kind, with the
+    nearest one."""
     if kind not in SCHEMAS:
         raise KembaError(kind, "no such kind of file", hint=suggest(kind, SCHEMAS))
     module, name = SCHEMAS[kind].split(":")

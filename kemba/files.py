@@ -41,9 +41,7 @@ def write_error(path: str | Path, error: OSError) -> WriteError:
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """A name to write to; the file appears under `path` only when the block ends without an error.
-
-    Raises WriteError when the disk is full or the folder cannot be written.
-    """
+    Raises WriteError when the disk is full or the folder cannot be written."""
     path = Path(path)
     temporary: Path | None = None
     try:
@@ -66,10 +64,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_text(path: str | Path) -> Iterator[TextIO]:
-    """A UTF-8 text file that appears under `path` only when the block ends without an error.
-
-    Raises WriteError when the disk is full or the folder cannot be written.
-    """
+    """A UTF-8 text file that appears under `path` only when the block ends without an error. Raises
+    WriteError when the disk is full or the folder cannot be written."""
     with (
         atomic_path(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="\n") as stream,

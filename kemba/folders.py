@@ -153,10 +153,8 @@ def unlock(lock: BaseFileLock | None, folder: Path) -> None:
 
 
 def try_writing(folder: str | Path) -> None:
-    """Make a folder and see that files can be written there, before long work begins.
-
-    Raises KembaError when they cannot, or when the disk is full.
-    """
+    """Make a folder and see that files can be written there, before long work begins. Raises
+    KembaError when they cannot, or when the disk is full."""
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -50,11 +50,8 @@ class Quantity:
                 "", f"column header '{text}' is malformed", "'path/symbol [unit]' was expected"
             )
         if not is_unit(match["unit"]):
-            raise KembaError(
-                "",
-                f"column header '{text}' has the malformed unit '{match['unit']}'",
-                "a unit such as [m.s-1], [N.m] or [1] was expected",
-            )
+            what = f"column header '{text}' has the malformed unit '{match['unit']}'"
+            raise KembaError("", what, "a unit such as [m.s-1], [N.m] or [1] was expected")
         return cls(match["name"], match["unit"])
 
 

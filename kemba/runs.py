@@ -116,10 +116,8 @@ class Run:
 
     @cached_property
     def certificate(self) -> dict[str, Any]:
-        """The outcome, residuals and replay of the plan.
-
-        Raises KembaError where the file is missing or is no certificate.
-        """
+        """The outcome, residuals and replay of the plan. Raises KembaError where the file is
+        missing or is no certificate."""
         found = read_json(self._file("certificate.json"))
         if not isinstance(found, dict):
             expected = "a group of keys, as solve writes it, was expected"
@@ -139,10 +137,8 @@ class Run:
 
 
 def load_run(path: str | Path) -> Run:
-    """The run in a folder, or in the folder of the file given.
-
-    Raises KembaError where there is no such folder, or it holds no run.
-    """
+    """The run in a folder, or in the folder of the file given. Raises KembaError where there is no
+    such folder, or it holds no run."""
     folder = Path(path)
     if folder.is_file():
         folder = folder.parent
@@ -157,10 +153,8 @@ def load_run(path: str | Path) -> Run:
 
 
 def newest_run(holds: str = "trajectory.csv", folder: str | Path = "runs") -> Path:
-    """The run in `folder` that was begun last, of those with the file `holds`.
-
-    Raises KembaError where there is none.
-    """
+    """The run in `folder` that was begun last, of those with the file `holds`. Raises KembaError
+    where there is none."""
     found = [file.parent for file in Path(folder).glob(f"*/{holds}")]
     if not found:
         what = (

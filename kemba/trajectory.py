@@ -51,12 +51,9 @@ def _headers(stream: TextIO, path: str | Path) -> list[str]:
             str(path), "is empty", "a header row starting with 'time [s]' was expected"
         )
     if ";" in line and "," not in line:
-        raise KembaError(
-            f"{path}:1",
-            "is separated by semicolons",
-            "commas, and decimal points, were expected",
-            map_hint(path),
-        )
+        what = "is separated by semicolons"
+        expected = "commas, and decimal points, were expected"
+        raise KembaError(f"{path}:1", what, expected, map_hint(path))
     return [cell.strip() for cell in _cells(line)]
 
 
@@ -280,9 +277,7 @@ class Trajectory:
 
     def write(self, path: str | Path) -> None:
         """Write a CSV to `path`, and the sidecar when there is metadata; reading it back is exact.
-
-        Raises KembaError when the times are not strictly increasing.
-        """
+        Raises KembaError when the times are not strictly increasing."""
         check_times(self.time, str(path), first_row=2)
         texts = [_texts(self.time), *(_texts(values) for values in self._columns.values())]
         with atomic_text(path) as stream:

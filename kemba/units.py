@@ -105,9 +105,7 @@ def to_si(value: float | int | str, unit: str) -> float:
 
 def convert(value: Number, source_unit: str, target_unit: str) -> Number:
     """`value` (a float or an array of any shape) in `source_unit`, expressed in `target_unit`.
-
-    Raises ValueError when a unit is unknown or the dimensions differ.
-    """
+    Raises ValueError when a unit is unknown or the dimensions differ."""
     if source_unit == target_unit:
         return value
     si, size = USUAL.get(source_unit, ("", 1.0))
@@ -115,7 +113,9 @@ def convert(value: Number, source_unit: str, target_unit: str) -> Number:
         return value * size
     (size, source), (divisor, target) = _parsed(source_unit), _parsed(target_unit)
     if source.dimensionality != target.dimensionality:
-        raise ValueError(f"is {_dimension(source_unit)}; {expectation(target_unit)}")
+        named = called_dimension(source)
+        named = f"in {source_unit}" if named.startswith("in ") else named
+        raise ValueError(f"is {named}; {expectation(target_unit)}")
     if "rad" in target_unit and re.search(r"Hz\b", source_unit):
         raise ValueError("could mean turns or radians; write rpm or rad.s-1")
     scaled = value if size == 1.0 else value * size
@@ -125,9 +125,7 @@ def convert(value: Number, source_unit: str, target_unit: str) -> Number:
 
 def read_si(value: float | int | str) -> tuple[float, str]:
     """Number and SI unit of a value of any dimension: `'5 mm'` is (0.005, 'm'), 3 is (3.0, '1').
-
-    Raises ValueError, in words for the author of the file.
-    """
+    Raises ValueError, in words for the author of the file."""
     if not isinstance(value, str):
         return to_si(value, "1"), "1"
     number, written = _split(value.strip(), "1")
@@ -266,12 +264,6 @@ def _symbol(name: str) -> pint.Unit:
         return registry().Unit({"%": "percent", "°": "deg"}.get(name, name))
     except (AttributeError, ValueError):  # pint's UndefinedUnitError is an AttributeError
         raise ValueError(f"has the unknown unit '{name}'; {suggest(name, COMMON)}") from None
-
-
-def _dimension(unit: str) -> str:
-    """The everyday name of a unit's dimension, with its article."""
-    named = called_dimension(parse_unit(unit))
-    return f"in {unit}" if named.startswith("in ") else named
 
 
 def _called(value: object) -> str:

@@ -32,8 +32,7 @@ def compare(
         Path | None, typer.Option(help="Figure to write: PNG, PDF or SVG (a new compare.png here).")
     ] = None,
     what_could_be_seen: Annotated[
-        bool,
-        typer.Option("--what-could-be-seen", help="Only which effects these logs could show."),
+        bool, typer.Option("--what-could-be-seen", help="Only which effects these logs could show.")
     ] = False,
     column_map: Foreign = None,
     force: Force = False,

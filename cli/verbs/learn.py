@@ -83,10 +83,8 @@ def learn(
 
 
 def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Path]]:
-    """The runs and the logs among the arguments; a folder of logs stands for what it holds.
-
-    Raises KembaError where a log does not exist.
-    """
+    """The runs and the logs among the arguments; a folder of logs stands for what it holds. Raises
+    KembaError where a log does not exist."""
     from kemba.errors import KembaError
     from kemba.logs import is_log_file, log_files
 

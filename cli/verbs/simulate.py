@@ -96,23 +96,14 @@ def _run(
     if "landed" in runs[0]:
         worst = max((abs(r["apex_error_m"]) for r in runs), default=0.0)
         sentence += f", off the plan by at most {1e3 * worst:.0f} mm; {kept(repeats)}"
-    sentence += fed_back
-    return {
-        "model": plant.name,
-        "folder": str(out),
-        "logs": [r["log"] for r in runs],
-        "runs": runs,
-        "sentence": sentence,
-    }
+    facts = {"model": plant.name, "folder": str(out), "logs": [r["log"] for r in runs]}
+    return {**facts, "runs": runs, "sentence": f"{sentence}{fed_back}"}
 
 
 def _rig(rig: Rig, model: str, folder: Path, seed: int, noise: bool) -> dict[str, Any]:
     from kemba.plant.rigs import bench_model, write_rig
 
     logs = write_rig(rig, lambda supply: bench_model(model, supply), folder, seed, noise)
-    return {
-        "model": model,
-        "folder": str(folder),
-        "logs": [str(path) for path in logs],
-        "sentence": f"{len(logs)} tests of the rig {rig.name} on {model}",
-    }
+    sentence = f"{len(logs)} tests of the rig {rig.name} on {model}"
+    facts = {"model": model, "folder": str(folder), "logs": [str(path) for path in logs]}
+    return {**facts, "sentence": sentence}

@@ -35,15 +35,10 @@ def view(
 
     Example: kemba-opt view runs/jump-1 --show
     """
-    shown = motion or newest(quiet)
-    if rerun is None:
-        from kemba.report.view import view_run
+    from kemba.report.view import record_run, view_run
 
-        path = view_run(shown, out, model, force, column_map, run)
-    else:
-        from kemba.report.view import record_run
-
-        path = record_run(shown, rerun, model, force, column_map, run)
+    shown, how = motion or newest(quiet), (model, force, column_map, run)
+    path = view_run(shown, out, *how) if rerun is None else record_run(shown, rerun, *how)
     print_json({"view": str(path)}) if json else typer.echo(path)
     if show and rerun is None:
         import webbrowser

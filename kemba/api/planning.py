@@ -93,9 +93,7 @@ def load_model(name: Path_ = "planning", supply: float | None = None) -> Model:
 
 def load_log(path: Path_, columns: ColumnMap | Path_ | None = None) -> Trajectory:
     """The log at `path`, of any format of `docs/logs.md`; `columns` is a column map or its file.
-
-    Raises KembaError with row and column of the first fault.
-    """
+    Raises KembaError with row and column of the first fault."""
     known = columns is None or isinstance(columns, ColumnMap)
     return read_log(path, columns if known else load_map(columns))  # type: ignore[arg-type]
 
@@ -182,14 +180,9 @@ def plan(
         models.insert(0, find_config(task, "tasks"))
     files = [*dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, files, ["kemba.plan"])
-    answer = solve_into(
-        folder,
-        resolved,
-        document,
-        Listener(progress or watched()),
-        Approach(starts=starts, replay=replay, cold=cold, memory=memory),
-        figure=False,
-    )
+    approach = Approach(starts=starts, replay=replay, cold=cold, memory=memory)
+    listener = Listener(progress or watched())
+    answer = solve_into(folder, resolved, document, listener, approach, figure=False)
     return Planned(folder.path, answer)
 
 

@@ -17,10 +17,8 @@ WIDTH = 100  # characters of a line
 
 
 def dump_text(data: Any) -> str:
-    """Plain data as YAML text; keys keep their order.
-
-    Raises TypeError for what is no plain data.
-    """
+    """Plain data as YAML text; keys keep their order. Raises TypeError for what is no plain
+    data."""
     import yaml
 
     try:
@@ -127,11 +125,8 @@ class Document:
 
 
 def load_yaml(path: str | Path) -> Document:
-    """The document in a YAML 1.2 file.
-
-    Raises KembaError when the file cannot be read, is not YAML or is larger than 2 MB, and
-    ConfigErrors listing all keys that occur twice.
-    """
+    """The document in a YAML 1.2 file. Raises KembaError when the file cannot be read, is not YAML
+    or is larger than 2 MB, and ConfigErrors listing all keys that occur twice."""
     try:
         with Path(path).open("rb") as stream:
             content = stream.read(LARGEST + 1)
@@ -147,10 +142,8 @@ def load_yaml(path: str | Path) -> Document:
 
 
 def load_text(text: str, source: str) -> Document:
-    """The document in a YAML text; `source` names it in messages.
-
-    Raises KembaError where the text is not valid YAML or a key is given twice.
-    """
+    """The document in a YAML text; `source` names it in messages. Raises KembaError where the text
+    is not valid YAML or a key is given twice."""
     blank = Document(None, source, text.splitlines())
     try:
         found = read(text)

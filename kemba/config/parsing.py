@@ -19,10 +19,8 @@ RANGE = {"equals", "at_least", "at_most"}
 
 
 def parse(document: Document | Mapping[str, Any], schema: type[Schema]) -> Schema:
-    """The document, or the same as a dict, as an instance of a pydantic model.
-
-    Raises ConfigErrors with all mistakes: place, what is wrong, what was expected.
-    """
+    """The document, or the same as a dict, as an instance of a pydantic model. Raises ConfigErrors
+    with all mistakes: place, what is wrong, what was expected."""
     if not isinstance(document, Document):
         document = Document(dict(document))
     try:

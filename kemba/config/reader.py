@@ -26,10 +26,8 @@ LONGEST_NUMBER = 40  # digits and signs; a float has 17 that count
 
 
 def resolve(text: str) -> tuple[str, Any]:
-    """The kind of a plain scalar (`null`, `bool`, `int`, `float` or `str`) and its value.
-
-    Raises ValueError, in words for the author, for numbers that no float can hold.
-    """
+    """The kind of a plain scalar (`null`, `bool`, `int`, `float` or `str`) and its value. Raises
+    ValueError, in words for the author, for numbers that no float can hold."""
     kind = next((name for name, pattern in PATTERNS.items() if pattern.fullmatch(text)), "str")
     if kind in ("int", "float") and len(text) > LONGEST_NUMBER:
         raise ValueError(f"this number has {len(text)} characters; {LONGEST_NUMBER} are allowed")
@@ -85,7 +83,7 @@ class YamlError(Exception):
 
 @dataclass
 class Tree:
-    """A node of the text: `value` is a scalar, a list of trees, or a list of (key, tree)."""
+    """A node of the text: `value` is a scalar, or a list of (key or number, its place, tree)."""
 
     mark: Mark
     value: Any = None
@@ -100,17 +98,40 @@ class Read:
     data: Any = None
     marks: dict[Location, Mark] = field(default_factory=dict)
     twice: list[tuple[Location, Mark, Mark]] = field(default_factory=list)
+    count: int = 0
+
+    def into(self, tree: Tree, location: Location) -> Any:
+        """The data of a tree at `location`, whose parts' lines are written down, and which keys are
+        given twice. An aliased tree counts at every alias, and is a copy there.
+
+        Raises YamlError where aliases make the tree too large or too deep.
+        """
+        self.count += 1
+        if self.count > MOST_NODES or len(location) > DEEPEST:
+            what = f"its aliases stand for more than {MOST_NODES} keys and values"
+            if len(location) > DEEPEST:
+                what = f"its aliases are nested deeper than {DEEPEST} levels"
+            raise YamlError(what, tree.mark)
+        if tree.kind == "scalar":
+            return tree.value[2]
+        parts: dict[str | int, Any] = {}
+        for part, mark, inner in tree.value:
+            place = (*location, part)
+            if place in self.marks:
+                self.twice.append((place, self.marks[place], mark))
+            else:
+                self.marks[place] = mark
+            parts[part] = self.into(inner, place)
+        return parts if tree.kind == "map" else [*parts.values()]
 
 
 def read(text: str) -> Read:
     """The data of a YAML text with one document. Raises YamlError."""
     if len(text) > LARGEST:
         raise YamlError(f"is longer than {LARGEST} characters")
-    found = Read()
-    tree = _Builder().tree(text)
+    found, tree = Read(), _Builder().tree(text)
     if tree is not None:
-        _Walk(found).into(tree, ())
-        found.data = _data(tree)
+        found.data = found.into(tree, ())
     return found
 
 
@@ -124,11 +145,8 @@ class _Builder:
         self.count = self.aliases = 0
 
     def tree(self, text: str) -> Tree | None:
-        """The tree of the one document; None when the text is empty.
-
-        Raises YamlError where the text is not valid YAML, goes beyond the limits, or holds a second
-        document.
-        """
+        """The tree of the one document; None when the text is empty. Raises YamlError where the
+        text is not valid YAML, goes beyond the limits, or holds a second document."""
         for event in _events(text):
             mark = (event.start_mark.line, event.start_mark.column)
             name = type(event).__name__
@@ -165,7 +183,7 @@ class _Builder:
             return
         holder, key = self.open[-1]
         if holder.kind == "seq":
-            holder.value.append(tree)
+            holder.value.append((len(holder.value), tree.mark, tree))
         elif key[0] is None:
             key[0] = (self._key(tree), tree.mark)
         else:
@@ -217,48 +235,6 @@ class _Builder:
         if kind != wanted:
             raise YamlError(f"'{text[:40]}' is no {wanted}, as its tag says", mark)
         return Tree(mark, (False, text, value))
-
-
-class _Walk:
-    """Places of all parts of a tree; an aliased tree counts at every alias."""
-
-    def __init__(self, found: Read) -> None:
-        self.found, self.count = found, 0
-
-    def into(self, tree: Tree, location: Location) -> None:
-        """Write down the line of every key of a tree at `location`, and which keys are given twice.
-
-        Raises YamlError where aliases make the tree too large or too deep.
-        """
-        self.count += 1
-        if self.count > MOST_NODES or len(location) > DEEPEST:
-            what = f"its aliases stand for more than {MOST_NODES} keys and values"
-            if len(location) > DEEPEST:
-                what = f"its aliases are nested deeper than {DEEPEST} levels"
-            raise YamlError(what, tree.mark)
-        for part, mark, inner in _parts(tree):
-            place = (*location, part)
-            if place in self.found.marks:
-                self.found.twice.append((place, self.found.marks[place], mark))
-            else:
-                self.found.marks[place] = mark
-            self.into(inner, place)
-
-
-def _parts(tree: Tree) -> Iterator[tuple[str | int, Mark, Tree]]:
-    if tree.kind == "map":
-        yield from tree.value
-    elif tree.kind == "seq":
-        yield from ((i, item.mark, item) for i, item in enumerate(tree.value))
-
-
-def _data(tree: Tree) -> Any:
-    """Plain data; aliases become copies, so that changing one does not change the other."""
-    if tree.kind == "map":
-        return {key: _data(inner) for key, _, inner in tree.value}
-    if tree.kind == "seq":
-        return [_data(item) for item in tree.value]
-    return tree.value[2]
 
 
 def _events(text: str) -> Iterator[Any]:

@@ -48,9 +48,7 @@ class Broken(Exception):  # noqa: N818  a promise that is not kept, no fault of 
 
 def example(effect: type[Effect]) -> Effect:
     """The effect at a typical strength: `off` value plus size, other values at their defaults.
-
-    Raises Broken when a field has no default.
-    """
+    Raises Broken when a field has no default."""
     values: dict[str, Any] = {}
     for name, off in effect.off.items():
         size = effect.declared()[name].size

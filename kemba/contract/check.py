@@ -47,10 +47,8 @@ POWER = 1e-6  # W; rounding of a dissipated power
 
 
 def finite(placed: Placed) -> None:
-    """Residual and slopes are finite at random states and at the borders, on robot and rig.
-
-    Raises Broken where it is not so.
-    """
+    """Residual and slopes are finite at random states and at the borders, on robot and rig. Raises
+    Broken otherwise."""
     for case in (placed, Placed(placed.effect, rig=True)) if placed.fits_rig else (placed,):
         for point in points(case.model):
             for name, value in case.slopes(**point, p=case.values).items():
@@ -61,10 +59,7 @@ def finite(placed: Placed) -> None:
 
 
 def every_parameter_matters(placed: Placed) -> None:
-    """Each parameter changes what the effect does.
-
-    Raises Broken where it is not so.
-    """
+    """Each parameter changes what the effect does. Raises Broken otherwise."""
     effect = placed.on
     if isinstance(effect, SensorEffect):
         return  # see `measuring`
@@ -85,10 +80,7 @@ def every_parameter_matters(placed: Placed) -> None:
 
 
 def off_is_absent(placed: Placed) -> None:
-    """At its off value the model is the same as without the effect.
-
-    Raises Broken where it is not so.
-    """
+    """At its off value the model is the same as without the effect. Raises Broken otherwise."""
     off = placed.on.bind(placed.effect.off)
     model = model_of(off)
     base = model_of() if off.replaces else without(model, off.name)
@@ -131,10 +123,7 @@ def settled(model: Model, point: Point, kept: list[int]) -> np.ndarray:
 
 
 def dissipates(placed: Placed) -> None:
-    """A dissipative effect never adds energy, and it takes some.
-
-    Raises Broken where it is not so.
-    """
+    """A dissipative effect never adds energy, and it takes some. Raises Broken otherwise."""
     base = without(placed.model, placed.on.name)
     lost = []
     for point in points(placed.model, 12):
@@ -147,10 +136,7 @@ def dissipates(placed: Placed) -> None:
 
 
 def order_does_not_matter(placed: Placed) -> None:
-    """The order of a model's list changes nothing.
-
-    Raises Broken where it is not so.
-    """
+    """The order of a model's list changes nothing. Raises Broken otherwise."""
     model = placed.model
     turned = Model(model.mechanism, model.effects[::-1], model.supply)
     for point in points(model, 2):
@@ -160,10 +146,8 @@ def order_does_not_matter(placed: Placed) -> None:
 
 
 def supply_can_be_left_open(placed: Placed) -> None:
-    """With the supply as a symbol, as in simulations that share equations, nothing changes.
-
-    Raises Broken where it is not so.
-    """
+    """With the supply as a symbol, as in simulations that share equations, nothing changes. Raises
+    Broken otherwise."""
     model = placed.model
     node = model.build([SUPPLY])
     for point in points(model, 2):
@@ -174,10 +158,8 @@ def supply_can_be_left_open(placed: Placed) -> None:
 
 
 def keeps_the_mirror(placed: Placed) -> None:
-    """With an effect on every leg the model keeps the mirror symmetry of its robot.
-
-    Raises Broken where it is not so.
-    """
+    """With an effect on every leg the model keeps the mirror symmetry of its robot. Raises Broken
+    otherwise."""
     from kemba.ocp.transcription.symmetry import find_symmetry
 
     if find_symmetry(placed.model) is None:
@@ -185,10 +167,7 @@ def keeps_the_mirror(placed: Placed) -> None:
 
 
 def one_leg_only(placed: Placed) -> None:
-    """With `on` it acts at that leg and does not change the others.
-
-    Raises Broken where it is not so.
-    """
+    """With `on` it acts at that leg and does not change the others. Raises Broken otherwise."""
     legs = placed.model.mechanism.legs
     here, other, kind = legs[-1], legs[0], placed.on.kind
     one = example(placed.effect).model_copy(update={"on": here})
@@ -221,10 +200,8 @@ def moves(effect: type[Effect]) -> bool:
 
 
 def sensor_fault_can_be_undone(placed: Placed) -> None:
-    """A sensor fault changes what is measured, and `undone` is the inverse of `measured`.
-
-    Raises Broken where it is not so.
-    """
+    """A sensor fault changes what is measured, and `undone` is the inverse of `measured`. Raises
+    Broken otherwise."""
     fault = placed.on
     if not isinstance(fault, SensorEffect):
         return
@@ -239,9 +216,7 @@ def sensor_fault_can_be_undone(placed: Placed) -> None:
 
 def nominal_figures_matter(placed: Placed) -> None:
     """What a fit leaves free within a tolerance is a figure of the effect and changes the model.
-
-    Raises Broken where it is not so.
-    """
+    Raises Broken otherwise."""
     effect = placed.resolved
     for name, tolerance in effect.nominal.items():
         if name not in type(effect).model_fields:
@@ -285,11 +260,6 @@ class Check:
         """Its name in words: `off is absent`."""
         return self.run.__name__.replace("_", " ")
 
-    @property
-    def doc(self) -> str:
-        """What is promised, in one sentence."""
-        return (self.run.__doc__ or "").split("\n")[0]
-
 
 @dataclass(frozen=True)
 class CheckResult:
@@ -327,9 +297,7 @@ def _raised(error: Exception) -> str:
 
 def documented(placed: Placed) -> None:
     """Docstring, family, equation and source are there; every parameter has an SI unit and a doc.
-
-    Raises Broken where it is not so.
-    """
+    Raises Broken otherwise."""
     effect = placed.effect
     if not effect.__doc__ or effect.__doc__ == effect.__base__.__doc__:
         raise Broken("the class has no docstring")
@@ -350,10 +318,8 @@ def documented(placed: Placed) -> None:
 
 
 def off_is_admissible(placed: Placed) -> None:
-    """`off` names declared parameters, lies within their bounds and is their default.
-
-    Raises Broken where it is not so.
-    """
+    """`off` names declared parameters, lies within their bounds and is their default. Raises Broken
+    otherwise."""
     effect = placed.effect
     for name, off in effect.off.items():
         if name not in effect.declared():
@@ -369,10 +335,7 @@ def off_is_admissible(placed: Placed) -> None:
 
 
 def yaml_round_trip(placed: Placed) -> None:
-    """Written to YAML and read again it is the same effect.
-
-    Raises Broken where it is not so.
-    """
+    """Written to YAML and read again it is the same effect. Raises Broken otherwise."""
     text = dump_text({"effects": [placed.on.listed()]})
     found = parse(load_text(text, "round trip"), ModelSpec).effects
     if found != (placed.on,):
@@ -382,10 +345,7 @@ def yaml_round_trip(placed: Placed) -> None:
 
 
 def schema_names_units(placed: Placed) -> None:
-    """The JSON Schema names the unit of every parameter.
-
-    Raises Broken where it is not so.
-    """
+    """The JSON Schema names the unit of every parameter. Raises Broken otherwise."""
     schema = json.dumps(placed.effect.model_json_schema())
     for name, param in placed.effect.declared().items():
         if f'"unit": "{param.unit}"' not in schema:

@@ -54,10 +54,8 @@ BY_KIND = Registry(EFFECTS)
 
 
 def load_effects(files: Mapping[str, str]) -> None:
-    """Load the files that another process has loaded (`BY_KIND.files`). For workers.
-
-    Raises KembaError where a file cannot be loaded, or has another content here.
-    """
+    """Load the files that another process has loaded (`BY_KIND.files`). For workers. Raises
+    KembaError where a file cannot be loaded, or has another content here."""
     for path, digest in files.items():
         BY_KIND.load_file(path)
         if BY_KIND.files.get(path) != digest:

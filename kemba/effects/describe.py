@@ -85,12 +85,8 @@ def _tables(effect: type[Effect]) -> Iterator[dict[str, Any]]:
     for name, info in effect.model_fields.items():
         param = _param_in(info.annotation)
         if param is not None and name not in effect.declared():
-            yield {
-                "name": name,
-                "unit": param.unit,
-                "default": _usual(effect, info.default),
-                "doc": param.doc,
-            }
+            usual = _usual(effect, info.default)
+            yield {"name": name, "unit": param.unit, "default": usual, "doc": param.doc}
 
 
 def _usual(effect: type[Effect], default: Any) -> Any:

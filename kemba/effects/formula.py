@@ -20,9 +20,7 @@ from kemba.units import called_dimension, parse_unit, si_name
 
 def check_dimension(tree: ast.expr, units: Mapping[str, str], unit: str) -> None:
     """Check that a formula's value has the dimension of `unit`; `units` are those of its names.
-
-    Raises ValueError with the part of the formula that is wrong.
-    """
+    Raises ValueError with the part of the formula that is wrong."""
     found = _Dimensions(units).of(tree)
     if not found.fits(parse_unit(unit)):
         raise ValueError(
@@ -32,10 +30,8 @@ def check_dimension(tree: ast.expr, units: Mapping[str, str], unit: str) -> None
 
 
 def unit_of(tree: ast.expr, units: Mapping[str, str]) -> str:
-    """The SI unit of a formula's value, `units` are those of its names.
-
-    Raises ValueError with the part of the formula whose dimensions do not fit together.
-    """
+    """The SI unit of a formula's value, `units` are those of its names. Raises ValueError with the
+    part of the formula whose dimensions do not fit together."""
     return si_name(_Dimensions(units).of(tree).unit)
 
 
@@ -137,10 +133,8 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {**PURE, **SAME, "sqrt": ca.sqrt}
 
 
 def parse_formula(text: str) -> ast.expr:
-    """The syntax tree of a formula, with its constant parts computed.
-
-    Raises ValueError where the text is no formula, is too long, or uses what is not allowed.
-    """
+    """The syntax tree of a formula, with its constant parts computed. Raises ValueError where the
+    text is no formula, is too long, or uses what is not allowed."""
     if len(text) > LONGEST:
         raise ValueError(f"is longer than {LONGEST} characters")
     try:

@@ -53,10 +53,8 @@ def read_source(path: Path) -> bytes:
 
 
 def effects_of_file(path: Path, source: bytes, module: str) -> tuple[type[Effect], ...]:
-    """The effects in a Python file, whose code is run as the module of this name.
-
-    Raises KembaError when the code fails (with the line) and when it defines no effect.
-    """
+    """The effects in a Python file, whose code is run as the module of this name. Raises KembaError
+    when the code fails (with the line) and when it defines no effect."""
     effects = _defined_in(_run(path, source, module))
     if not effects:
         expected = "a subclass of kemba.effects.Effect was expected"

@@ -34,10 +34,8 @@ def cylinder_angle(leg: Leg, flexion: ca.SX) -> ca.SX:
 
 
 def flexion(leg: Leg, x: float) -> float:
-    """Knee flexion [rad] for a piston extension `x` [m]; 0 is a straight leg.
-
-    Raises ValueError where the linkage cannot reach.
-    """
+    """Knee flexion [rad] for a piston extension `x` [m]; 0 is a straight leg. Raises ValueError
+    where the linkage cannot reach."""
     return float(flexions(leg, np.array([x]))[0])
 
 

@@ -161,20 +161,15 @@ class Mechanism:
 
 
 def _scene_ports(mechanism: Mechanism, scene: Scene) -> dict[str, Port]:
-    found: dict[str, ca.SX] = {}
-    for leg in mechanism.legs if not scene.plain else ():
-        for point in POINTS:
-            x, z = (mechanism.ports[f"{leg}/{point}/{axis}"].phi for axis in "xz")
-            found[f"{leg}/{point}/gap"] = z - scene.ground.height(x)
-            rooms = [box.room(scene.ground, x, z) for box in scene.obstacles]
-            for i, room in enumerate(rooms):
-                found[f"{leg}/{point}/room{i or ''}"] = room
-    doc = {"gap": "height above the ground under it", "room": "height above an obstacle"}
-    return {
-        name: Port(
-            Quantity(name, "m", doc=doc[name.rpartition("/")[2].rstrip("0123456789")]),
-            Quantity(f"{name}_rate", "m.s-1"),
-            phi,
-        )
-        for name, phi in found.items()
-    }
+    found: dict[str, Port] = {}
+
+    def add(name: str, height: ca.SX, doc: str) -> None:
+        rate = Quantity(f"{name}_rate", "m.s-1")
+        found[name] = Port(Quantity(name, "m", doc=f"height above {doc}"), rate, height)
+
+    for place in (f"{leg}/{p}" for leg in mechanism.legs if not scene.plain for p in POINTS):
+        x, z = (mechanism.ports[f"{place}/{axis}"].phi for axis in "xz")
+        add(f"{place}/gap", z - scene.ground.height(x), "the ground under it")
+        for i, box in enumerate(scene.obstacles):
+            add(f"{place}/room{i or ''}", box.room(scene.ground, x, z), "an obstacle")
+    return found

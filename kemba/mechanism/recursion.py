@@ -174,13 +174,9 @@ def link_tolerances(joints: Iterable[Joint], shares: Mapping[str, float]) -> dic
     Links are named by the joint that carries them: `front/hip.mass` is that of the front femur.
     `shares`: 1 sigma by figure; figures with 0 are known exactly and left out.
     """
-    return {
-        f"{joint.name}.{figure}": share
-        for joint in joints
-        if joint.mass
-        for figure, share in shares.items()
-        if share
-    }
+    unsure = {figure: share for figure, share in shares.items() if share}
+    heavy = (joint.name for joint in joints if joint.mass)
+    return {f"{name}.{figure}": share for name in heavy for figure, share in unsure.items()}
 
 
 def link_forces(

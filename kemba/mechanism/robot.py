@@ -16,6 +16,7 @@ from kemba.mechanism.planar import Mechanism, Port
 from kemba.mechanism.recursion import (
     FrameMotion,
     Joint,
+    Vector,
     forward,
     link_forces,
     link_tolerances,
@@ -118,7 +119,7 @@ def _mechanism(drawn: Robot, offsets: Offsets, symbols: Offsets) -> Mechanism:
     motions = dict(
         zip((j.name for j in joints), forward(joints, tree, tree_v, tree_a, 0.0), strict=True)
     )
-    mass = sum(j.mass for j in drawn_joints)
+    mass, points = sum(j.mass for j in drawn_joints), _points(shape, motions)
     return Mechanism(
         name=robot.name,
         q=q,
@@ -127,7 +128,7 @@ def _mechanism(drawn: Robot, offsets: Offsets, symbols: Offsets) -> Mechanism:
         coordinates=coordinates,
         velocities=velocities,
         inverse_dynamics=ca.jtimes(tree, q, tree_tau, True),
-        ports=_ports(shape, q, motions),
+        ports=_ports(shape, q, points),
         legs=tuple(robot.legs),
         weight=float(mass * robot.gravity),
         mass=float(mass),
@@ -139,7 +140,7 @@ def _mechanism(drawn: Robot, offsets: Offsets, symbols: Offsets) -> Mechanism:
         cylinder=robot.cylinder,
         mirror=_mirror(robot),
         standing=standing_pose(robot),
-        points=_points(shape, motions),
+        points={name: ca.vertcat(*at) for name, at in points.items()},
         tolerances=link_tolerances(drawn_joints, robot.tolerances.model_dump()),
     )
 
@@ -193,19 +194,14 @@ def _closed(robot: Robot, offsets: Offsets) -> Robot:
     """The robot, if its masses and lengths are positive and its knee closes at both ends of the
     stroke."""
     if min(robot.body.mass, robot.leg.femur.mass) <= 0.0:
-        raise KembaError(
-            "effects.mass_split",
-            f"m = {offsets[SPLIT]:g} kg leaves the body or the legs no mass",
-            "less mass than either has was expected",
-        )
+        what = f"m = {offsets[SPLIT]:g} kg leaves the body or the legs no mass"
+        raise KembaError("effects.mass_split", what, "less mass than either has was expected")
     lengths = {part: d for part, d in offsets.items() if part != SPLIT}
     for part, d in lengths.items():
         if nominal_length(robot.leg, part) <= 0.0:
-            raise KembaError(
-                f"effects.geometry:{part}",
-                f"d = {1e3 * d:g} mm leaves nothing of this length",
-                "a small difference between machine and drawing was expected",
-            )
+            what = f"d = {1e3 * d:g} mm leaves nothing of this length"
+            expected = "a small difference between machine and drawing was expected"
+            raise KembaError(f"effects.geometry:{part}", what, expected)
     for x in (0.0, robot.stroke) if lengths else ():
         try:
             knee.flexion(robot.leg, x)
@@ -273,7 +269,7 @@ def _coordinates(robot: Robot) -> tuple[tuple[Quantity, ...], tuple[Quantity, ..
     return tuple(q), tuple(v)
 
 
-def _ports(robot: Robot, q: ca.SX, motions: dict[str, FrameMotion]) -> dict[str, Port]:
+def _ports(robot: Robot, q: ca.SX, points: dict[str, Vector]) -> dict[str, Port]:
     legs = len(robot.legs)
     ports = [
         _port("body/x", "body/vx", "m", q[0], "body centre, forward"),
@@ -281,33 +277,22 @@ def _ports(robot: Robot, q: ca.SX, motions: dict[str, FrameMotion]) -> dict[str,
         _port("body/pitch", "body/pitch_rate", "rad", q[2], "nose up positive"),
     ]
     for i, (leg, place) in enumerate(robot.legs.items()):
-        bend = place.fold * q[3 + legs + i]
-        hip, tibia = motions[f"{leg}/hip"], motions[f"{leg}/knee"]
-        foot = tibia.turn((0.0, -robot.leg.tibia.length))
-        x, z = tibia.position
+        x = knee.extension(robot.leg, place.fold * q[3 + legs + i])
         ports += [
             _port(f"{leg}/hip/q", f"{leg}/hip/w", "rad", q[3 + i], "femur against body"),
             _port(f"{leg}/knee/q", f"{leg}/knee/w", "rad", q[3 + legs + i], "tibia against femur"),
-            _port(
-                f"{leg}/piston/x",
-                f"{leg}/piston/v",
-                "m",
-                knee.extension(robot.leg, bend),
-                "piston extension, 0 retracted",
-            ),
-            _point(leg, "foot", "x", x + foot[0]),
-            _point(leg, "foot", "z", z + foot[1]),
-            _point(leg, "knee", "x", x),
-            _point(leg, "knee", "z", z),
-            _point(leg, "hip", "x", hip.position[0]),
-            _point(leg, "hip", "z", hip.position[1]),
+            _port(f"{leg}/piston/x", f"{leg}/piston/v", "m", x, "piston extension, 0 retracted"),
         ]
+        for point in (f"{leg}/foot", f"{leg}/knee", f"{leg}/hip"):
+            for axis, phi in zip("xz", points[point], strict=True):
+                doc = f"{point.removeprefix(f'{leg}/')} position, {axis}"
+                ports.append(_port(f"{point}/{axis}", f"{point}/v{axis}", "m", phi, doc))
     return {p.quantity.name: p for p in ports}
 
 
-def _points(robot: Robot, motions: dict[str, FrameMotion]) -> dict[str, ca.SX]:
+def _points(robot: Robot, motions: dict[str, FrameMotion]) -> dict[str, Vector]:
     """Where each leg's hip, knee and foot are, and its cylinder's pivot and its rod's pin."""
-    points: dict[str, ca.SX] = {}
+    points: dict[str, Vector] = {}
     for leg in robot.legs:
         hip, tibia = motions[f"{leg}/hip"], motions[f"{leg}/knee"]
         sole = tibia.turn((0.0, -robot.leg.tibia.length))
@@ -319,17 +304,12 @@ def _points(robot: Robot, motions: dict[str, FrameMotion]) -> dict[str, ca.SX]:
             "mount": motions[f"{leg}/cylinder"].position,
             "pin": motions[f"{leg}/rod"].position,
         }
-        points |= {f"{leg}/{place}": ca.vertcat(*at) for place, at in places.items()}
+        points |= {f"{leg}/{place}": at for place, at in places.items()}
     return points
 
 
 def _port(name: str, rate: str, unit: str, phi: ca.SX, doc: str) -> Port:
     return Port(Quantity(name, unit, doc=doc), Quantity(rate, f"{unit}.s-1", doc=doc), phi)
-
-
-def _point(leg: str, point: str, axis: str, phi: ca.SX) -> Port:
-    name = f"{leg}/{point}/{axis}"
-    return _port(name, f"{leg}/{point}/v{axis}", "m", phi, f"{point} position, {axis}")
 
 
 def _mirror(robot: Robot) -> dict[str, str]:

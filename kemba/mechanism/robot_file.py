@@ -30,12 +30,9 @@ def find_file(name: str | Path, kind: str, beside: Path | None = None) -> Path:
         return found[0]
     listed = [path.name for folder in folders for path in folder.glob("*.yaml")]
     looked = "beside the file that names it, in the current folder and among the shipped ones"
-    raise KembaError(
-        str(name),
-        f"no such file: '{name}'",
-        f"one of the {kind} was looked for {looked}",
-        suggest(str(name), [*shipped, *listed]),
-    )
+    what = f"no such file: '{name}'"
+    expected = f"one of the {kind} was looked for {looked}"
+    raise KembaError(str(name), what, expected, suggest(str(name), [*shipped, *listed]))
 
 
 def load_robot(name: str | Path) -> Robot:

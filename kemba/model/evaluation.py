@@ -43,10 +43,8 @@ class Instance:
 
     def variables(self, role: str) -> dict[Key, Quantity]:
         """Its `states`, `inputs` or `forces`, under their full column names."""
-        found = {}
-        for symbol, quantity in getattr(self.effect, role)().items():
-            found[(self.leg, symbol)] = replace(quantity, name=full_name(self.leg, quantity.name))
-        return found
+        own = getattr(self.effect, role)()
+        return {(self.leg, s): replace(q, name=full_name(self.leg, q.name)) for s, q in own.items()}
 
 
 def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Instance]:
@@ -62,11 +60,9 @@ def place_effects(mechanism: Mechanism, effects: Iterable[Effect]) -> list[Insta
         legs: Iterable[str | None] = (None,) if effect.place == "body" else mechanism.legs
         if effect.leg is not None:
             if effect.leg not in mechanism.legs:
-                raise KembaError(
-                    f"effects.{effect.name}",
-                    f"{mechanism.name} has no leg '{effect.leg}'",
-                    hint=suggest(effect.leg, filter(None, mechanism.legs)),
-                )
+                what = f"{mechanism.name} has no leg '{effect.leg}'"
+                hint = suggest(effect.leg, filter(None, mechanism.legs))
+                raise KembaError(f"effects.{effect.name}", what, hint=hint)
             legs = (effect.leg,)
         for leg in legs:
             if gone & {(effect.kind, None), (effect.kind, leg)}:
@@ -80,11 +76,9 @@ def _check_ports(mechanism: Mechanism, effect: Effect, leg: str | None) -> None:
     for alias in effect.ports:
         name = port_name(leg, alias)
         if name not in mechanism.ports:
-            raise KembaError(
-                f"effects.{effect.name}",
-                f"needs the port '{name}', which {mechanism.name} does not have",
-                hint=f"ports: {', '.join(mechanism.ports)}",
-            )
+            what = f"needs the port '{name}', which {mechanism.name} does not have"
+            hint = f"ports: {', '.join(mechanism.ports)}"
+            raise KembaError(f"effects.{effect.name}", what, hint=hint)
 
 
 def port_name(leg: str | None, alias: str) -> str:
@@ -132,10 +126,8 @@ class Evaluation:
         return _Place(self, leg)
 
     def contribution(self, index: int) -> Contribution:
-        """What instance `index` adds; evaluated once.
-
-        Raises KembaError where the effect reads a value that depends on itself.
-        """
+        """What instance `index` adds; evaluated once. Raises KembaError where the effect reads a
+        value that depends on itself."""
         if index not in self._contributions:
             if index in self._busy:
                 raise KembaError(self.instances[index].label, "reads a value that depends on it")
@@ -146,10 +138,8 @@ class Evaluation:
         return self._contributions[index]
 
     def lookup(self, leg: str | None, symbol: str) -> Any:
-        """Value of a symbol as seen from `leg`: a signal, a variable, or a published value.
-
-        Raises KembaError where nothing gives it.
-        """
+        """Value of a symbol as seen from `leg`: a signal, a variable, or a published value. Raises
+        KembaError where nothing gives it."""
         if symbol in self.slots or (leg, symbol) in self.inputs:
             return self.signal(leg, symbol)
         for place in (leg, None):
@@ -194,11 +184,9 @@ class Evaluation:
         for instance in self.instances:
             for name, signal in instance.effect.signals(self.at(instance.leg)).items():
                 if name not in heard:
-                    raise KembaError(
-                        f"effects.{instance.effect.name}",
-                        f"changes the signal '{name}', which no effect of this model reads",
-                        hint="add the effect it acts on, or remove it",
-                    )
+                    what = f"changes the signal '{name}', which no effect of this model reads"
+                    hint = "add the effect it acts on, or remove it"
+                    raise KembaError(f"effects.{instance.effect.name}", what, hint=hint)
                 found.setdefault((instance.leg, name), []).append(signal)
         for (leg, name), signals in found.items():
             if sum(s.lagged is not None for s in signals) > 1:

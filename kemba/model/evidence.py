@@ -138,10 +138,8 @@ def write_covariance(path: Path, names: Sequence[str], matrix: Array) -> Path:
 
 
 def matrix_in(file: Path, parameters: Iterable[str]) -> tuple[tuple[str, ...], Array]:
-    """Names and covariance (k, k) in a file; `parameters`: those that the model has.
-
-    Raises KembaError where the file is missing, malformed, of other parameters, or no covariance.
-    """
+    """Names and covariance (k, k) in a file; `parameters`: those that the model has. Raises
+    KembaError where the file is missing, malformed, of other parameters, or no covariance."""
     expected = "a header of names effect.parameter, then as many rows of numbers, were expected"
     try:
         with file.open(encoding="utf-8-sig", newline="") as stream:

@@ -134,8 +134,18 @@ class Model:
     @property
     def state(self) -> list[Quantity]:
         """What the state x = (q, v, s) consists of: coordinates, velocities, effect states."""
-        moving = self.mechanism.coordinates, self.mechanism.velocities
-        return [*moving[0], *moving[1], *self.states.values()]
+        return [quantity for group in ("q", "v", "s") for quantity in self.groups[group]]
+
+    @cached_property
+    def groups(self) -> dict[str, tuple[Quantity, ...]]:
+        """The quantities of the node's symbols q, v, s, u and lam."""
+        return {
+            "q": self.mechanism.coordinates,
+            "v": self.mechanism.velocities,
+            "s": tuple(self.states.values()),
+            "u": tuple(self.inputs.values()),
+            "lam": tuple(self.forces.values()),
+        }
 
     @property
     def ignored(self) -> list[str]:

@@ -98,11 +98,7 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     return Trajectory(
         (ticks - lead) / round(1 / PERIOD),
         columns,
-        {
-            "kind": "controller",
-            "lead": lead / round(1 / PERIOD),
-            **model.mechanism.scene.dump(),
-        },
+        {"kind": "controller", "lead": lead / round(1 / PERIOD), **model.mechanism.scene.dump()},
     )
 
 

@@ -164,6 +164,7 @@ def warnings(plan: Plan) -> list[str]:
 
 TAKEN = ("solve_s", "solve_cpu_s", "build_s", "iterations", "variables", "constraints")
 RESIDUALS = ("complementarity", "binary", "dynamics", "bounds")
+RELAXED = ("requirement", "where", "asked", "reachable", "unit")
 
 
 def answer(plan: Plan, run: str) -> dict[str, Any]:
@@ -196,13 +197,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         "best_known": None,
         "ignored": plan.model.ignored,
         "remarks": [*plan.model.remarks, *warnings(plan)],
-        "relax": [
-            {
-                name: getattr(r, name)
-                for name in ("requirement", "where", "asked", "reachable", "unit")
-            }
-            for r in plan.relax
-        ],
+        "relax": [{name: getattr(r, name) for name in RELAXED} for r in plan.relax],
         "worst": [
             {key: value for key, value in asdict(v).items() if key != "size"}
             for v in certificate.worst

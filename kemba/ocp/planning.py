@@ -221,13 +221,8 @@ def plan(
 
 def spent(old: Plan, new: Plan) -> Plan:
     """A plan with the solves and times up to a later one."""
-    return replace(
-        old,
-        attempts=new.attempts,
-        solve_s=new.solve_s,
-        solve_cpu_s=new.solve_cpu_s,
-        build_s=new.build_s,
-    )
+    taken = ("attempts", "solve_s", "solve_cpu_s", "build_s")
+    return replace(old, **{name: getattr(new, name) for name in taken})
 
 
 def check_feasible(
@@ -251,10 +246,8 @@ def check_feasible(
 
 
 def program_size(task: Task, document: Document, model: str | Path | None = None) -> dict[str, int]:
-    """Variables and rows of the whole program of a task, everything checked, nothing solved.
-
-    Raises KembaError as `check_feasible` does.
-    """
+    """Variables and rows of the whole program of a task, everything checked, nothing solved. Raises
+    KembaError as `check_feasible` does."""
     built, requirements = check_feasible(task, document, model)
     if task.sequence:
         task, built, requirements = as_one(task, document)

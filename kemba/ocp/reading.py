@@ -22,10 +22,8 @@ from kemba.trajectory import Trajectory
 
 
 def load_task(name: str | Path, overrides: list[str] | None = None) -> tuple[Task, Document]:
-    """The task YAML `name` (a path or a shipped task) and its document, for error positions.
-
-    Raises KembaError with every mistake at its line.
-    """
+    """The task YAML `name` (a path or a shipped task) and its document, for error positions. Raises
+    KembaError with every mistake at its line."""
     document = apply_overrides(load_yaml(find_config(name, "tasks")), overrides or [])
     return read_task(document), document
 
@@ -117,9 +115,7 @@ Motion = tuple[Task, Document]
 
 def motions(task: Task, document: Document, within: Sequence[str] = ()) -> list[Motion]:
     """The motions of a sequence in order, repeated ones as often as asked, with their documents.
-
-    Raises KembaError, at the line of the sequence, for a file that is missing or names itself.
-    """
+    Raises KembaError, at the line of the sequence, for a file that is missing or names itself."""
     found: list[Motion] = []
     within = within or (document.source,)
     folder = Path(document.source).parent if document.source else Path()

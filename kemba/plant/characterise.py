@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from kemba.plant.kernel.machine import Array
 from kemba.plant.rigs import drive, followed
 from kemba.plant.supplies import tell_supplies
 from kemba.trajectory import Trajectory
+
+Key = TypeVar("Key")
 
 
 @dataclass(frozen=True)
@@ -123,16 +125,22 @@ def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
         for edge in indices:
             later = every[every > edge]
             stop = int(later[0]) if len(later) else len(log)
-            u = float(valves[chamber][edge])
-            rise = _rise(log, int(edge), stop, sign, chamber)
+            switched = float(valves[chamber][edge]), float(own.mean()), stroke
+            rise = _rise(log, int(edge), stop, sign, chamber, switched)
             if rise is not None:
-                yield Rise(u=u, x=float(own.mean()), stroke=stroke, **rise)
+                yield rise
 
 
 def _rise(
-    log: Trajectory, edge: int, stop: int, sign: float, chamber: str
-) -> dict[str, Any] | None:
-    """The answer to the switching at row `edge`, until row `stop`; None where it shows nothing."""
+    log: Trajectory,
+    edge: int,
+    stop: int,
+    sign: float,
+    chamber: str,
+    facts: tuple[float, float, float],
+) -> Rise | None:
+    """The answer to the switching at row `edge`, until row `stop`; None where it shows nothing.
+    `facts`: the first ones of a `Rise`."""
     force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
     before = float(force[max(edge - 20, 0) : edge].mean())
     after = float(force[stop - max((stop - edge) // 10, 3) : stop].mean())
@@ -141,14 +149,9 @@ def _rise(
     level = (force[edge - 1 : stop] - before) / (after - before)
     low, high = (_crossing(time, level, share) for share in (LOW, HIGH))
     dead = low - (high - low) * LOW / (HIGH - LOW)
-    return {
-        "supply": log.meta.get("supply", NOMINAL_SUPPLY),
-        "chamber": chamber,
-        "time": time,
-        "level": level,
-        "dead": dead,
-        "plateau": max(before, after),
-    }
+    supply = log.meta.get("supply", NOMINAL_SUPPLY)
+    u, x, stroke = facts
+    return Rise(u, x, stroke, supply, chamber, time, level, dead, max(before, after))
 
 
 def _crossing(time: Array, level: Array, share: float) -> float:
@@ -159,21 +162,23 @@ def _crossing(time: Array, level: Array, share: float) -> float:
 
 def dead_times(rises: Iterable[Rise]) -> dict[str, Estimate]:
     """Dead times [s] of switching `on` and `off`, as far as the tests have them."""
-    found: dict[str, list[float]] = {}
-    for rise in rises:
-        found.setdefault("on" if rise.u else "off", []).append(rise.dead)
-    return {name: mean(np.array(values)) for name, values in found.items()}
+    return _means(("on" if rise.u else "off", rise.dead) for rise in rises)
+
+
+def _means(values: Iterable[tuple[Key, float]]) -> dict[Key, Estimate]:
+    """The mean of the values of each key."""
+    groups: dict[Key, list[float]] = {}
+    for key, value in values:
+        groups.setdefault(key, []).append(value)
+    return {key: mean(np.array(own)) for key, own in groups.items()}
 
 
 def rise_table(rises: Iterable[Rise]) -> RiseTable:
     """Dead times and the bilinear time constants of eq. 5. Raises KembaError on too few tests."""
     rises = list(rises)
     if {r.u for r in rises} != {0.0, 1.0} or len({round(r.x, 4) for r in rises}) < 2:
-        raise KembaError(
-            "characterise",
-            "the locked tests do not cover filling and venting at two positions",
-            "tests as in configs/rigs/locked.yaml were expected",
-        )
+        what = "the locked tests do not cover filling and venting at two positions"
+        raise KembaError("characterise", what, "tests as in configs/rigs/locked.yaml were expected")
     dead = dead_times(rises)
     fits = [r.fit(dead["on" if r.u else "off"].value) for r in rises]
     taus = np.array([tau for tau, _ in fits])
@@ -303,13 +308,14 @@ def characterise(
     rises = [rise for log in logs.values() for rise in find_rises(log, cylinder.stroke)]
     strokes = [s for s in map(find_stroke, logs.values()) if s is not None]
     if not rises and not strokes:
-        raise KembaError(
-            "characterise",
-            "no log holds a locked rod with a switching valve, or a steady stroke",
-            "bench logs as kemba-opt simulate writes them for configs/rigs were expected",
-        )
+        what = "no log holds a locked rod with a switching valve, or a steady stroke"
+        expected = "bench logs as kemba-opt simulate writes them for configs/rigs were expected"
+        raise KembaError("characterise", what, expected)
     table = rise_table(rises) if rises else None
-    lines, plateaus = stroke_table(strokes), _plateaus(rises)
+    lines, plateaus = (
+        stroke_table(strokes),
+        _means(((r.chamber, r.supply), r.plateau) for r in rises),
+    )
     effects = fitted_effects(cylinder, table, lines, plateaus)
     check = {}
     for name, log in logs.items():
@@ -360,14 +366,6 @@ def _over(
 ) -> tuple[float, ...]:
     """Values of a mode at the supplies, those of `table` of an effect where a test is missing."""
     return tuple(found.get((mode, p), float(at_supply(usual, table, p))) for p in supplies)
-
-
-def _plateaus(rises: Iterable[Rise]) -> dict[tuple[str, float], Estimate]:
-    """Steady force of each chamber at each supply, from the locked tests."""
-    groups: dict[tuple[str, float], list[float]] = {}
-    for rise in rises:
-        groups.setdefault((rise.chamber, rise.supply), []).append(rise.plateau)
-    return {key: mean(np.array(values)) for key, values in groups.items()}
 
 
 def agreement(predicted: Trajectory, log: Trajectory) -> tuple[float, float]:

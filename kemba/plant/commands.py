@@ -57,8 +57,7 @@ class Profile:
     def at(self, times: Array) -> Array:
         """The values at `times` (m,) [s]."""
         index = np.searchsorted(self.times, times + SAME_TIME, side="right") - 1
-        found: Array = self.values[np.maximum(index, 0)]
-        return found
+        return np.asarray(self.values[np.maximum(index, 0)])
 
 
 @dataclass(frozen=True)
@@ -82,8 +81,7 @@ class JointControl:
     def at(self, times: Array) -> Array:
         """What is wanted at `times` (k,) [s]: (k, joints, 3)."""
         index = np.searchsorted(self.times, times + SAME_TIME) - 1
-        found: Array = self.wanted[np.clip(index, 0, len(self.times) - 1)]
-        return found
+        return np.asarray(self.wanted[np.clip(index, 0, len(self.times) - 1)])
 
 
 @dataclass(frozen=True)
@@ -115,10 +113,8 @@ def find_input(model: Model, name: str, where: str) -> int:
 
 
 def input_table(model: Model, profiles: Mapping[str, Profile], times: Array) -> Array:
-    """Values (m, nu) from each of `times` (m,) [s] on; NaN where no profile says them.
-
-    Raises KembaError on unknown names.
-    """
+    """Values (m, nu) from each of `times` (m,) [s] on; NaN where no profile says them. Raises
+    KembaError on unknown names."""
     table = np.full((len(times), len(model.inputs)), np.nan)
     for name, profile in profiles.items():
         table[:, find_input(model, name, model.name)] = profile.at(times)
@@ -147,10 +143,8 @@ def merged(*times: Array) -> Array:
 
 def among(marks: Array, times: Array) -> Array:
     """Whether each of `marks` (m,) is one of `times`."""
-    found: Array = np.searchsorted(times, marks - SAME_TIME) < np.searchsorted(
-        times, marks + SAME_TIME
-    )
-    return found
+    first, last = (np.searchsorted(times, marks + off) for off in (-SAME_TIME, SAME_TIME))
+    return np.asarray(first < last)
 
 
 def acting(sent: Profile, on: float, off: float) -> Profile:

@@ -126,11 +126,8 @@ def _affine(node: Node) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     moving = ca.vertcat(node.a, node.lam, node.sd)
     for rows, form in ((node.dynamics_rows, ca.horzcat(M, B)), (node.rate_rows, f)):
         if form.numel() and any(ca.which_depends(ca.vec(ca.densify(form)), moving, 1, True)):
-            raise KembaError(
-                rows[0].label,
-                "is not affine in accelerations and forces",
-                "the plant steps only such models",
-            )
+            what = "is not affine in accelerations and forces"
+            raise KembaError(rows[0].label, what, "the plant steps only such models")
     zero = [ca.SX.zeros(node.a.numel()), ca.SX.zeros(node.lam.numel())]
     bias = ca.substitute([node.dynamics], [node.a, node.lam], zero)[0]
     return M, -bias, B, f

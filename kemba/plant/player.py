@@ -78,10 +78,8 @@ class Player:
         self._inputs = {name: i for i, name in enumerate(input_names(model))}
 
     def play(self, step: float | None) -> None:
-        """Fill the record, in steps of up to `step` [s]; None: as long as the motion allows.
-
-        Raises KembaError.
-        """
+        """Fill the record, in steps of up to `step` [s]; None: as long as the motion allows. Raises
+        KembaError."""
         if step is None:
             pace = Pace(np.array([FIRST_STEP]), SHORTEST_STEP, LONGEST_STEP, TOLERANCE)
         else:
@@ -97,7 +95,9 @@ class Player:
                 raise self._failed(str(error)) from None
             self._fetch_impacts()
             if why == BURIED:
-                raise self._buried()
+                deepest = int(np.argmin(self.now.gap))
+                label, depth = self.pairs.labels[self.pairs.gaps[deepest]], -self.now.gap[deepest]
+                raise KembaError("initial", f"{label} starts {1e3 * depth:.1f} mm too deep")
             if why == EXPLODED:
                 raise self._failed("the motion explodes")
             if why == ASK:
@@ -105,11 +105,6 @@ class Player:
 
     def _failed(self, what: str) -> KembaError:
         return KembaError(self.model.name, f"{what} at {self.now.time[0]:.4f} s", hint=SMALLER)
-
-    def _buried(self) -> KembaError:
-        deepest = int(np.argmin(self.now.gap))
-        label, depth = self.pairs.labels[self.pairs.gaps[deepest]], -self.now.gap[deepest]
-        return KembaError("initial", f"{label} starts {1e3 * depth:.1f} mm too deep")
 
     def _fetch_impacts(self) -> None:
         log, gaps = self._log, self.pairs.gaps

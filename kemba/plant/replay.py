@@ -142,9 +142,8 @@ def _hits(impacts: Iterable[Impact]) -> dict[str, list[float]]:
 def _fault(
     model: Model, plan: Trajectory, clock: Array, real: Trajectory, standing: list[str]
 ) -> str | None:
-    pitch, planned = float(real["body/pitch"][-1]), 0.0
-    if "body/pitch" in plan:
-        planned = float(plan["body/pitch"][-1])
+    pitch = float(real["body/pitch"][-1])
+    planned = float(plan["body/pitch"][-1]) if "body/pitch" in plan else 0.0
     if turned(pitch, planned) > UPRIGHT:
         return "tips over"
     if abs(pitch - planned) > np.pi:

@@ -116,7 +116,9 @@ class Roundings:
         while 1.0 < best.error < before and self.left > 0:
             before = best.error
             for edges in (shared_edges(table), single_edges(table)):
-                groups = [group for group in edges if _earliest(table, group) <= last]
+                ticks = edges_of(table)
+                first = [min(table.time[ticks[name][k]] for name, k in group) for group in edges]
+                groups = [group for group, at in zip(edges, first, strict=True) if at <= last]
                 if groups:
                     best = self.around(best, groups)
         return best
@@ -207,8 +209,3 @@ def retimed(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
     course = read(plan, PLANNED, model.mechanism.weight, plan.time - plan.time[0])
     last = max((flight.end for flight in course.flights), default=np.inf)
     return Roundings(run, EXECUTIONS).best(table, last).table
-
-
-def _earliest(table: Trajectory, group: Group) -> float:
-    """When [s] the first edge of a group comes."""
-    return float(min(table.time[edges_of(table)[name][k]] for name, k in group))

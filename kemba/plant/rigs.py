@@ -1,9 +1,9 @@
 """The paper's bench rigs: what they impose on a piston, from YAML, and their logs."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -49,7 +49,10 @@ def drive(
     edges = breaks([*acting.values(), *valves.values()], times[0], times[-1])
     marks = merged(times, edges)
     u, sent = (np.nan_to_num(input_table(model, p, marks)) for p in (acting, valves))
-    s = at_rest(model, motion(times[:1])[0], u[0]) if start is None else _given(model, start)
+    if start is None:
+        s = at_rest(model, motion(times[:1])[0], u[0])
+    else:
+        s = np.array([start.get(q.name, q.value) for q in model.states.values()], dtype=float)
     states = [s]
     for held, (begin, end) in zip(u, pairwise(marks), strict=False):
         count = max(1, int(np.ceil((end - begin) / step - 1e-6)))
@@ -67,10 +70,6 @@ def drive(
     for quantity, values in zip(quantities, [*s.T, *sent.T, *np.array(measured)], strict=True):
         columns.setdefault(quantity.header, values)
     return Trajectory(times, columns)
-
-
-def _given(model: Model, start: Mapping[str, float]) -> Array:
-    return np.array([start.get(q.name, q.value) for q in model.states.values()], dtype=float)
 
 
 @lru_cache(maxsize=8)
@@ -187,14 +186,25 @@ class Rig(Section):
 
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
         """The tests in order, of a cylinder of `stroke` [m]; random ones are drawn from `rng`.
-
-        Raises KembaError where a position lies beyond the stroke.
-        """
+        Raises KembaError where a position lies beyond the stroke."""
         raise NotImplementedError
+
+    @property
+    def numbers(self) -> range:
+        """Of the repetitions of a test."""
+        return range(1, self.repeats + 1)
 
     def clock(self, duration: float) -> Array:
         """Sample times [s] of a test."""
         return np.arange(int(duration * self.rate) + 1) / self.rate
+
+
+def check_places(key: str, places: Iterable[float], stroke: float) -> None:
+    """Raise KembaError, which blames a `key`, for a place [m] beyond the stroke."""
+    for x in places:
+        if x > stroke:
+            what = f"{1e3 * x:g} mm is beyond the stroke"
+            raise KembaError(f"rig.{key}", what, f"0 to {1e3 * stroke:g} mm was expected")
 
 
 class LockedRig(Rig):
@@ -213,21 +223,15 @@ class LockedRig(Rig):
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
         """As of every rig. Raises KembaError where a position is outside of the stroke."""
         positions = (0.0, stroke) if self.positions is None else self.positions
-        for x in positions:
-            if x > stroke:
-                what = f"{1e3 * x:g} mm is beyond the stroke"
-                raise KembaError("rig.positions", what, f"0 to {1e3 * stroke:g} mm was expected")
-        for supply in self.supplies:
-            for x in positions:
-                for switch in self.switch:
-                    steps = [0.0, 1.0] if switch == "fill" else [1.0, 0.0]
-                    valve = Profile(np.array([-1.0, self.command]), np.array(steps))
-                    valves = {f"valve/{self.chamber}": valve}
-                    facts = {"test": "locked", "switch": switch, "position": x}
-                    for number in range(1, self.repeats + 1):
-                        name = f"{switch}-{1e3 * x:.0f}mm-{supply / 1e6:.1f}MPa-{number}"
-                        times = self.clock(self.duration)
-                        yield Test(name, supply, locked(x), valves, times, facts)
+        check_places("positions", positions, stroke)
+        each = product(self.supplies, positions, self.switch, self.numbers)
+        for supply, x, switch, number in each:
+            steps = [0.0, 1.0] if switch == "fill" else [1.0, 0.0]
+            valve = Profile(np.array([-1.0, self.command]), np.array(steps))
+            facts = {"test": "locked", "switch": switch, "position": x}
+            name = f"{switch}-{1e3 * x:.0f}mm-{supply / 1e6:.1f}MPa-{number}"
+            valves, times = {f"valve/{self.chamber}": valve}, self.clock(self.duration)
+            yield Test(name, supply, locked(x), valves, times, facts)
 
 
 class DynamometerRig(Rig):
@@ -243,11 +247,9 @@ class DynamometerRig(Rig):
     settle: Second = 0.05
 
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
-        for supply in self.supplies:
-            for mode, speeds in self.speeds.items():
-                for speed in speeds:
-                    for number in range(1, self.repeats + 1):
-                        yield self._test(supply, mode, speed, number, stroke)
+        cases = [(mode, speed) for mode, speeds in self.speeds.items() for speed in speeds]
+        for supply, (mode, speed), number in product(self.supplies, cases, self.numbers):
+            yield self._test(supply, mode, speed, number, stroke)
 
     def _test(self, supply: float, mode: str, speed: float, number: int, way: float) -> Test:
         u_e, u_r = VALVES[mode]
@@ -272,18 +274,16 @@ class RandomRig(Rig):
     duration: Second = 10.0
 
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
-        for supply in self.supplies:
-            for number in range(1, self.repeats + 1):
-                knots = np.arange(int(self.duration * self.frequency) + 2) / self.frequency
-                motion = hermite(knots, *self._states(len(knots), rng, stroke))
-                valves = {
-                    f"valve/{chamber}": Profile.of(knots, rng.integers(0, 2, len(knots)))
-                    for chamber in ("extend", "retract")
-                }
-                name = f"random-{supply / 1e6:.1f}MPa-{number}"
-                yield Test(
-                    name, supply, motion, valves, self.clock(self.duration), {"test": "random"}
-                )
+        knots = np.arange(int(self.duration * self.frequency) + 2) / self.frequency
+        times = self.clock(self.duration)
+        for supply, number in product(self.supplies, self.numbers):
+            motion = hermite(knots, *self._states(len(knots), rng, stroke))
+            valves = {
+                f"valve/{chamber}": Profile.of(knots, rng.integers(0, 2, len(knots)))
+                for chamber in ("extend", "retract")
+            }
+            name = f"random-{supply / 1e6:.1f}MPa-{number}"
+            yield Test(name, supply, motion, valves, times, {"test": "random"})
 
     def _states(self, count: int, rng: np.random.Generator, stroke: float) -> tuple[Array, Array]:
         """Positions and speeds whose cubic pieces stay within the stroke."""
@@ -323,29 +323,21 @@ class CourseRig(Rig):
     def tests(self, rng: np.random.Generator, stroke: float) -> Iterator[Test]:
         """As of every rig. Raises KembaError where a place is outside of the stroke, or spans of a
         valve are not one after the other."""
-        for x in self.places:
-            if x > stroke:
-                what = f"{1e3 * x:g} mm is beyond the stroke"
-                raise KembaError("rig.places", what, f"0 to {1e3 * stroke:g} mm was expected")
+        check_places("places", self.places, stroke)
         valves = {"valve/extend": spans("extend", self.extend)}
         valves["valve/retract"] = spans("retract", self.retract)
         motion = monotone(self.every * np.arange(len(self.places)), np.array(self.places))
-        for supply in self.supplies:
-            for number in range(1, self.repeats + 1):
-                name = f"course-{supply / 1e6:.1f}MPa-{number}"
-                facts = {"test": "course"}
-                yield Test(name, supply, motion, valves, self.clock(self.duration), facts)
+        for supply, number in product(self.supplies, self.numbers):
+            name, times = f"course-{supply / 1e6:.1f}MPa-{number}", self.clock(self.duration)
+            yield Test(name, supply, motion, valves, times, {"test": "course"})
 
 
 def spans(valve: str, on: Sequence[tuple[float, float]]) -> Profile:
     """A valve that is on in these spans [s]. Raises KembaError where they overlap."""
     edges = [time for span in on for time in span]
     if any(later <= earlier for earlier, later in pairwise(edges)):
-        raise KembaError(
-            f"rig.{valve}",
-            "has spans that overlap or end before they begin",
-            "[begin, end] one after the other was expected",
-        )
+        what = "has spans that overlap or end before they begin"
+        raise KembaError(f"rig.{valve}", what, "[begin, end] one after the other was expected")
     values = [0.0] + [float(i % 2 == 0) for i in range(len(edges))]
     return Profile(np.array([-1.0, *edges]), np.array(values))
 
@@ -380,12 +372,9 @@ def run_rig(
     Deterministic by `seed`.
     """
     rng = np.random.default_rng(seed)
-    models: dict[float, Model] = {}
+    models = {supply: model(supply) for supply in rig.supplies}
     sensors = Sensors(noise={"F": FORCE_NOISE, "x": 1e-5, "P": 1e3} if noise else {})
-    first = models[rig.supplies[0]] = model(rig.supplies[0])
-    for test in rig.tests(rng, first.mechanism.stroke):
-        if test.supply not in models:
-            models[test.supply] = model(test.supply)
+    for test in rig.tests(rng, models[rig.supplies[0]].mechanism.stroke):
         piston = models[test.supply]
         truth = drive(piston, test.motion, test.valves, test.times)
         log = take_log(truth, sensors, rng, piston.effects)
@@ -399,7 +388,6 @@ def write_rig(
     """Run a rig and write one log per test; the paths in order."""
     paths = []
     for name, log in run_rig(rig, model, seed, noise):
-        path = Path(out) / f"{name}.csv"
-        log.write(path)
-        paths.append(path)
+        paths.append(Path(out) / f"{name}.csv")
+        log.write(paths[-1])
     return paths

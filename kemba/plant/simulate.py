@@ -63,10 +63,8 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
 
 
 def lowest_foot(model: Model, values: Mapping[str, float]) -> float:
-    """Height [m] of the lowest foot above its ground in the pose of `initial_values`.
-
-    Raises KembaError likewise.
-    """
+    """Height [m] of the lowest foot above its ground in the pose of `initial_values`. Raises
+    KembaError likewise."""
     return _lowest_foot(model, initial_values(model, values)[0])
 
 
@@ -125,9 +123,7 @@ class Condition:
 
 def simulate(model: Model, *arguments: Any, **named: Any) -> Trajectory:
     """The motion with every output, state, input and force; arguments are those of `Condition`.
-
-    Raises KembaError on unknown names and on models without free motion.
-    """
+    Raises KembaError on unknown names and on models without free motion."""
     return run(model, *arguments, **named).trajectory
 
 
@@ -203,9 +199,7 @@ def _samples(duration: float, sample: float | Array) -> Array:
     if np.ndim(sample):
         return np.asarray(sample, dtype=float)
     times = np.arange(int(duration / float(sample) + 1e-6) + 1) * float(sample)
-    if duration - times[-1] > SAME_TIME:
-        return np.append(times, duration)
-    return np.append(times[:-1], duration)
+    return np.append(times[times < duration - SAME_TIME], duration)
 
 
 _STARTED: list[subprocess.Popen[bytes]] = []  # nobody waits for it: the kernel's lock does

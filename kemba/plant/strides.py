@@ -48,11 +48,8 @@ def multipliers(model: Model, plan: Trajectory) -> Array:
     after = _stride_map(model, plan)
     columns = []
     for q in listed:
-        ends = [after({q.name: sign * STEP * q.scale}) for sign in (1.0, -1.0)]
-        each = (
-            (ends[0][other.name] - ends[1][other.name]) / (2 * STEP * q.scale) for other in listed
-        )
-        columns.append(list(each))
+        up, down = (after({q.name: sign * STEP * q.scale}) for sign in (1.0, -1.0))
+        columns.append([(up[o.name] - down[o.name]) / (2 * STEP * q.scale) for o in listed])
     return np.asarray(np.linalg.eigvals(np.array(columns).T))
 
 
@@ -86,9 +83,8 @@ class Stability:
     def sentence(self) -> str:
         """In words."""
         own, plant = self.kept["table_replay"], self.kept["plant_replay"]
-        text = (
-            f"open loop {own} of {self.of} strides on its own model, {plant} on the simulated robot"
-        )
+        kept = f"{own} of {self.of} strides on its own model, {plant} on the simulated robot"
+        text = f"open loop {kept}"
         if self.largest is not None:
             grow = "grow" if self.largest > 1.0 else "shrink"
             text += f"; errors {grow} {self.largest:.3g} times a stride"

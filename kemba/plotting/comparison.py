@@ -262,11 +262,7 @@ def in_words(columns: Sequence[Column]) -> list[tuple[str, ...]]:
 def place_of(column: Column) -> tuple[int, str, int]:
     """Sort key of a column: place of its phase, valve mode, place of its region."""
     phase, mode, region = column
-    return (
-        list(PHASES).index(phase) if phase in PHASES else len(PHASES),
-        mode,
-        REGIONS.index(region),
-    )
+    return [*PHASES, phase].index(phase), mode, REGIONS.index(region)
 
 
 def _heat(

@@ -179,13 +179,11 @@ def plot_strokes(strokes: Sequence[Stroke], figure: Figure | None = None) -> Fig
     supplies = {s.supply for s in strokes if s.supply > 0.0} or {0.0}
     supply = min(supplies, key=lambda p: abs(p - NOMINAL_SUPPLY))
     shown = [s for s in strokes if s.supply in (supply, 0.0)]
-    modes = [mode for mode in LOOKS if any(s.mode == mode for s in shown)]
+    own = {mode: [s for s in shown if s.mode == mode] for mode in LOOKS}
     points = {
-        mode: (
-            np.array([s.speed for s in shown if s.mode == mode]),
-            np.array([s.force for s in shown if s.mode == mode]),
-        )
-        for mode in modes
+        mode: (np.array([s.speed for s in group]), np.array([s.force for s in group]))
+        for mode, group in own.items()
+        if group
     }
     lines = {line.mode: (line.F_static.value, line.c_d.value) for line in stroke_table(shown)}
     return plot_force_velocity(points, lines, figure)

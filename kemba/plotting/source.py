@@ -84,9 +84,7 @@ def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
 
 def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
     """The plan in a run folder, or the trajectory in a log file; `columns` maps foreign columns.
-
-    Raises KembaError.
-    """
+    Raises KembaError."""
     path = Path(path)
     file = path / PLAN_FILE if path.is_dir() and not is_log_file(path) else path
     if not file.exists():

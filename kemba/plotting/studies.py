@@ -200,14 +200,9 @@ def plot_robustness(
         f"landed ({good.sum()})": (good, BLUE),
         f"fell ({(~good).sum()})": (~good, VERMILLION),
     }
-    shown = [(label, apex[rows], hue) for label, (rows, hue) in groups.items() if rows.any()]
-    left.hist(
-        [values for _, values, _ in shown],
-        edges,
-        stacked=True,
-        label=[label for label, _, _ in shown],
-        color=[hue for _, _, hue in shown],
-    )
+    shown = {label: (apex[rows], hue) for label, (rows, hue) in groups.items() if rows.any()}
+    values, hues = ([each[i] for each in shown.values()] for i in (0, 1))
+    left.hist(values, edges, stacked=True, label=list(shown), color=hues)
     if planned is not None:
         left.axvline(planned, color=GREY, ls="--", label="plan")
     left.set_xlabel("apex [m]")

@@ -79,9 +79,8 @@ class Builder:
         u = np.array([self.motion[name][i] for name in self.inputs])
         for name, profile in self.acting.items():
             u[self.inputs.index(name)] = profile(valves_at)
-        return Point(
-            self.x[i], u, self.hybrid.modes(self.motion, i if modes_of is None else modes_of)
-        )
+        modes = self.hybrid.modes(self.motion, i if modes_of is None else modes_of)
+        return Point(self.x[i], u, modes)
 
     def _start(self) -> Array:
         """What touches at the start stops at once: the slope of that."""
@@ -145,9 +144,8 @@ class Builder:
             if c.label in labels and before.modes[k] == OPEN and rates[k] < -CLOSING
         ]  # fmt: skip
         orders = list(permutations(new)) if 1 < len(new) <= 3 else [tuple(new)]
-        return np.asarray(
-            np.mean([self._in_order(before, after, order, labels) for order in orders], axis=0)
-        )
+        each = [self._in_order(before, after, order, labels) for order in orders]
+        return np.asarray(np.mean(each, axis=0))
 
     def _in_order(
         self, before: Point, after: Point, order: Sequence[int], labels: set[str]
@@ -179,11 +177,8 @@ class Builder:
 
 
 def course_of(model: Model, table: Trajectory) -> EventCourse:
-    """The linearised execution of a controller table.
-
-    Raises KembaError where the table cannot be simulated, ValueError for a model with other pairs
-    than rigid contacts and stops.
-    """
+    """The linearised execution of a controller table. Raises KembaError where the table cannot be
+    simulated, ValueError for a model with other pairs than rigid contacts and stops."""
     table, hybrid = read_controller(table), Hybrid(model)
     condition, begin = condition_of(table, model)
     commands, last = condition.commands, condition.duration
@@ -194,12 +189,9 @@ def course_of(model: Model, table: Trajectory) -> EventCourse:
     done, finer = simulate_one(condition), np.zeros(0)
     for number in range(PASSES):  # marks near an impact move it by some microseconds
         hits = np.array([time[:2] for time in _clusters(done.impacts, last)]).reshape(-1, 2)
-        beside = np.concatenate([hits[:, 0] - BESIDE, hits[:, 1] + BESIDE])
-        marks = merged(clock, switched[switched > 0.0], beside, finer)
-        inside = (
-            (marks[:, None] > hits[:, 0] - BESIDE) & (marks[:, None] < hits[:, 1] + BESIDE)
-        ).any(1)
-        marks = marks[~inside]
+        begins, ends = hits[:, 0] - BESIDE, hits[:, 1] + BESIDE
+        marks = merged(clock, switched[switched > 0.0], begins, ends, finer)
+        marks = marks[~((marks[:, None] > begins) & (marks[:, None] < ends)).any(1)]
         done = simulate_one(replace(condition, sample=marks[marks < last - 1e-9]))
         if number == 0:
             finer = _changes(hybrid, done.trajectory)

@@ -114,11 +114,9 @@ def player_of(file: str | Path, run: str | Path) -> Play:
 def _knees(model: Model) -> dict[str, ca.Function]:
     """Piston extensions by knee angles, by piston column."""
     mechanism = model.mechanism
-    names = [c.name for c in mechanism.coordinates]
-    found = {}
-    for leg in mechanism.legs:
-        angle = mechanism.q[names.index(f"{leg}/knee/q")]
-        found[f"{leg}/piston/x"] = ca.Function(
-            "x", [angle], [mechanism.port(f"{leg}/piston/x").phi]
-        )
-    return found
+    angles = {c.name: mechanism.q[i] for i, c in enumerate(mechanism.coordinates)}
+    pistons = {leg: mechanism.port(f"{leg}/piston/x").phi for leg in mechanism.legs}
+    return {
+        f"{leg}/piston/x": ca.Function("x", [angles[f"{leg}/knee/q"]], [x])
+        for leg, x in pistons.items()
+    }

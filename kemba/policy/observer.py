@@ -91,17 +91,10 @@ def outputs(course: EventCourse) -> Array:
 
 def _by_tick(events: Sequence[Event]) -> Iterator[tuple[Tick, list[Event]]]:
     """Every tick of the controller, and what happens until the next."""
-    tick: Tick | None = None
-    between: list[Event] = []
-    for event in events:
-        if isinstance(event, Tick):
-            if tick is not None:
-                yield tick, between
-            tick, between = event, []
-        else:
-            between.append(event)
-    if tick is not None:
-        yield tick, between
+    ticks = [(i, event) for i, event in enumerate(events) if isinstance(event, Tick)]
+    ends = [*(i for i, _ in ticks[1:]), len(events)]
+    for (i, tick), end in zip(ticks, ends, strict=False):
+        yield tick, list(events[i + 1 : end])
 
 
 def _noise(course: EventCourse) -> Array:

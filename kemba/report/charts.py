@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from kemba.files import plain
 from kemba.identify.logs.clock import in_plans_clock
 from kemba.plotting.source import Source, load_source
 from kemba.runs import PLANT_RUN, Run
@@ -75,20 +76,28 @@ def grid_of(tracks: Sequence[Track]) -> Array:
 def on_grid(track: Track, name: str, grid: Array, steps: bool = False) -> Array:
     """A column at the times (n,) of the grid; NaN before it begins and after it ends."""
     t = track.t
-    values = t[name]
+    if not steps or not np.isfinite(t[name]).any():
+        return onto(grid, t.time, t[name])
+    if track.source.plan:
+        row = np.searchsorted(t.time, grid - 1e-9, side="left")
+    else:
+        row = np.searchsorted(t.time, grid + 1e-9, side="right") - 1
+    found = track.source.held(name)[np.clip(row, 0, len(t) - 1)]
+    return np.where(_beyond(grid, t.time), np.nan, found)
+
+
+def onto(grid: Array, time: Array, values: Array) -> Array:
+    """Values (n,) at times (n,), interpolated to those (m,) of a grid; NaN before and after."""
     known = np.isfinite(values)
     if not known.any():
         return np.full(len(grid), np.nan)
-    if steps:
-        if track.source.plan:
-            row = np.searchsorted(t.time, grid - 1e-9, side="left")
-        else:
-            row = np.searchsorted(t.time, grid + 1e-9, side="right") - 1
-        found = track.source.held(name)[np.clip(row, 0, len(t) - 1)]
-    else:
-        found = np.interp(grid, t.time[known], values[known])
-    outside = (grid < t.time[0] - 1e-9) | (grid > t.time[-1] + 1e-9)
-    return np.where(outside, np.nan, found)
+    found = np.interp(grid, time[known], values[known])
+    return np.where(_beyond(grid, time), np.nan, found)
+
+
+def _beyond(grid: Array, time: Array) -> Array:
+    """Which times (m,) of a grid lie before or after others (n,)."""
+    return np.asarray((grid < time[0] - 1e-9) | (grid > time[-1] + 1e-9))
 
 
 Spans = Sequence[tuple[float, float]]
@@ -171,8 +180,13 @@ class Book:
         ]
         time = [round(float(t), 4) for t in self.grid]
         whole = {"time": time, "tracks": looks, "marks": self.marks, "charts": self.charts}
-        text = json.dumps(whole, separators=(",", ":"), allow_nan=False)
-        return text.replace("<", "\\u003c")
+        return script_text(whole)
+
+
+def script_text(data: dict[str, Any]) -> str:
+    """Data as JSON that can stand within a script: no name in it can end the script."""
+    text = json.dumps(plain(data), separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c")
 
 
 def colour(tracks: Sequence[Track], index: int) -> str:

@@ -17,7 +17,7 @@ from kemba.mechanism import Cylinder
 from kemba.model import Model
 from kemba.plant.controller import motor_of
 from kemba.plotting.source import EXACT, Machine, Mask
-from kemba.report.charts import Book, Chart, Curve, Track, colour, table
+from kemba.report.charts import Book, Chart, Curve, Track, colour, onto, table
 from kemba.report.motion import Events
 from kemba.trajectory import Array, Trajectory
 
@@ -68,10 +68,8 @@ def _cone(t: Trajectory, model: Model, machine: Machine, leg: str) -> Array:
     if ground is None or not all(name in t for name in names):
         return np.full(len(t), np.nan)
     along, normal = (t[name] for name in names)
-    least = 0.0
-    if t.meta.get("kind") not in EXACT:
-        least = CLEAR * difference_sigma(normal)
-    loaded = normal > max(LOADED * model.mechanism.weight, least)
+    noise = 0.0 if t.meta.get("kind") in EXACT else difference_sigma(normal)
+    loaded = normal > max(LOADED * model.mechanism.weight, CLEAR * noise)
     loaded &= machine.stance(t, leg)
     x = t.get(f"{leg}/foot/x", np.zeros(len(t)))
     mu = model.mechanism.scene.ground.friction(x, ground.mu)
@@ -140,17 +138,16 @@ def pressure(t: Trajectory, leg: str, side: str, cylinder: Cylinder) -> Array | 
 def air_drawn(track: Track, leg: str, cylinder: Cylinder) -> float | None:
     """Air [kg] that a leg's chambers take from the supply: what each holds more after its valve
     was on, at room temperature."""
-    t = track.t
-    place = f"{leg}/piston/x" if leg else "piston/x"
+    t, own = track.t, f"{leg}/" if leg else ""
     drawn, found = 0.0, False
     for side in ("extend", "retract"):
-        P, valve = pressure(t, leg, side, cylinder), f"{leg}/valve/{side}" if leg else ""
-        if P is None or place not in t or (valve or f"valve/{side}") not in t:
+        P, place, valve = pressure(t, leg, side, cylinder), f"{own}piston/x", f"{own}valve/{side}"
+        if P is None or place not in t or valve not in t:
             continue
         x = t[place] if side == "extend" else cylinder.stroke - t[place]
         area = cylinder.area_extend if side == "extend" else cylinder.area_retract
         mass = P * (cylinder.tube + area * x) / (GAS * TEMPERATURE)
-        on = np.nan_to_num(t[valve or f"valve/{side}"]) > 0.5
+        on = np.nan_to_num(t[valve]) > 0.5
         for start, end in track.source.spans(np.asarray(on)):
             a, b = np.interp([start, end], t.time[np.isfinite(mass)], mass[np.isfinite(mass)])
             drawn += max(0.0, float(b - a))
@@ -181,9 +178,7 @@ def energy_of(
     track: Track, legs: Sequence[str], cylinder: Cylinder, certificate: Mapping[str, Any]
 ) -> Energy:
     """The energy of one motion."""
-    listed = track.t.meta.get("impacts")
-    if track.role == "plan":
-        listed = certificate.get("impacts")
+    listed = (certificate if track.role == "plan" else track.t.meta).get("impacts")
     drawn = [air_drawn(track, leg, cylinder) for leg in legs]
     return Energy(
         _summed([_piston_power(track, leg, cylinder) for leg in legs], track),
@@ -336,35 +331,27 @@ def limit_parts(book: Book, model: Model, machine: Machine) -> list[str]:
     """Torque-speed planes, use of motor and friction cone in time, and a table of it all."""
     legs = machine.mechanism.legs
     used = {leg: [use_of(track, model, machine, leg) for track in book.tracks] for leg in legs}
-    planes, charts = [], []
-    for leg, uses in used.items():
-        motor = motor_of(model, leg)
-        if motor:
-            planes.append(torque_speed(leg, book.tracks, uses, motor))
-    for title, name in (
-        ("hip: share of motor limit", "motor"),
-        ("foot: share of friction cone", "cone"),
-    ):
+    motors, charts = {leg: motor_of(model, leg) for leg in legs}, []
+    planes = [torque_speed(leg, book.tracks, used[leg], m) for leg, m in motors.items() if m]
+    shares = {"hip: share of motor limit": "motor", "foot: share of friction cone": "cone"}
+    for title, name in shares.items():
         for leg, uses in used.items():
-            lines = [
-                Curve(track.name, 100.0 * _onto(book.grid, track, getattr(use, name)), i)
-                for i, (track, use) in enumerate(zip(book.tracks, uses, strict=True))
-            ]
+            lines = _curves(book, [getattr(use, name) for use in uses], 100.0)
             charts.append(book.add(Chart(f"{leg.title()} {title}", "%", lines, levels=(100.0,))))
-    charts.append(book.add(_supply_chart(book)))
+    lines = _curves(book, [supply_share(track.t) for track in book.tracks], 100.0)
+    charts.append(book.add(Chart("Supply pressure, of that at the start", "%", lines, least=10.0)))
     grid = f'<div class="grid legs">{"".join(planes)}{"".join(charts)}</div>'
     return [_limit_table(book.tracks, used, machine), grid]
 
 
-def _supply_chart(book: Book) -> Chart:
-    """How far the supply falls while the chambers draw on it."""
-    levels = [(i, track, supply_share(track.t)) for i, track in enumerate(book.tracks)]
-    lines = [
-        Curve(track.name, 100.0 * _onto(book.grid, track, level), i)
-        for i, track, level in levels
-        if level is not None
+def _curves(book: Book, values: Sequence[Array | None], factor: float = 1.0) -> list[Curve]:
+    """A curve for every motion of which `values` (rows,) are known."""
+    each = enumerate(zip(book.tracks, values, strict=True))
+    return [
+        Curve(track.name, factor * _onto(book.grid, track, known), i)
+        for i, (track, known) in each
+        if known is not None
     ]
-    return Chart("Supply pressure, of that at the start", "%", lines, least=10.0)
 
 
 def _limit_table(
@@ -407,43 +394,30 @@ def energy_parts(book: Book, machine: Machine, certificate: Mapping[str, Any]) -
     cylinder = machine.mechanism.need_cylinder()
     found = [energy_of(t, machine.mechanism.legs, cylinder, certificate) for t in book.tracks]
     rows = [
-        [
-            escape(track.name),
-            *_both(one.pistons),
-            *_both(one.hips),
-            _or_dash(one.impacts, 1, "J"),
-            _air(one),
-        ]
+        [escape(track.name), *_both(one.pistons), *_both(one.hips),
+         _or_dash(one.impacts, 1, "J"), _air(one)]
         for track, one in zip(book.tracks, found, strict=True)
-    ]
+    ]  # fmt: skip
     heads = ["motion", "pistons put in", "pistons take out", "hips put in", "hips take out"]
     text = table("Energy", [*heads, "impacts take", "air drawn"], rows)
-    charts = []
-    for title, name in (("Work of the pistons", "pistons"), ("Work of the hips", "hips")):
-        lines = [
-            Curve(track.name, _onto(book.grid, track, work), i)
-            for i, (track, one) in enumerate(zip(book.tracks, found, strict=True))
-            if (work := getattr(one, name)) is not None
-        ]
-        charts.append(book.add(Chart(title, "J", lines, least=1.0)))
+    work = {"pistons": [one.pistons for one in found], "hips": [one.hips for one in found]}
+    charts = [
+        book.add(Chart(f"Work of the {name}", "J", _curves(book, values), least=1.0))
+        for name, values in work.items()
+    ]
     note = (
         '<p class="soft">Work of the pistons: of the force on the rod, after friction and damping. '
-        "Air drawn: what the "
-        "chambers hold more after each time a valve was on, at 20 deg C; 1 l at atmospheric "
-        "pressure.</p>"
+        "Air drawn: what the chambers hold more after each time a valve was on, at 20 deg C; 1 l "
+        "at atmospheric pressure.</p>"
     )
     return [text, f'<div class="grid">{"".join(charts)}</div>', note]
 
 
 def _onto(grid: Array, track: Track, values: Array) -> Array:
     """Values by row of a motion at the times of the page."""
-    time, known = track.t.time, np.isfinite(values)
-    if not known.any():
-        return np.full(len(grid), np.nan)
+    time = track.t.time
     at = np.clip(np.searchsorted(time, grid), 0, len(time) - 1)
-    found = np.interp(grid, time[known], values[known])
-    outside = (grid < time[0] - 1e-9) | (grid > time[-1] + 1e-9) | ~known[at]
-    return np.where(outside, np.nan, found)
+    return np.where(np.isfinite(values)[at], onto(grid, time, values), np.nan)
 
 
 def _largest(values: Array, unit: str, digits: int) -> str:

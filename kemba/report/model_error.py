@@ -14,9 +14,9 @@ from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.problem.types import MissingForce
 from kemba.identify.workflow import check_all, compare_read, model_of
-from kemba.report.charts import COMPARED, Book, Chart, Curve, meter, picture, table
+from kemba.report.charts import COMPARED, Book, Chart, Curve, meter, onto, picture, table
 from kemba.stopwatch import Tell, silent
-from kemba.trajectory import Array, Trajectory
+from kemba.trajectory import Trajectory
 
 Facts = Mapping[str, Any]
 PICTURES = {
@@ -240,23 +240,10 @@ def missing_charts(book: Book, error: ModelError, clock: Callable[[str], float])
 
 
 def _band(book: Book, missing: MissingForce, k: int, clock: float) -> str:
-    low, high = missing.band()
-
-    def at(values: Array) -> Array:
-        time = missing.time + clock
-        found = np.interp(book.grid, time, values)
-        outside = (book.grid < time[0]) | (book.grid > time[-1])
-        return np.asarray(np.where(outside, np.nan, found))
-
+    ends, time = missing.band(), missing.time + clock
+    force, low, high = (onto(book.grid, time, of[:, k]) for of in (missing.force, *ends))
     channel = missing.channels[k].replace("piston/x", "rod").replace("hip/q", "hip")
+    title, unit = f"Missing on {channel.replace('/', ' ')}, 95 % band", missing.units[k]
     stands = [(a + clock, b + clock) for a, b in missing.stance]
-    return book.add(
-        Chart(
-            f"Missing on {channel.replace('/', ' ')}, 95 % band",
-            missing.units[k],
-            [Curve("missing", at(missing.force[:, k]))],
-            (at(low[:, k]), at(high[:, k])),
-            levels=(0.0,),
-            stands=stands,
-        )
-    )
+    lines = [Curve("missing", force)]
+    return book.add(Chart(title, unit, lines, (low, high), levels=(0.0,), stands=stands))

@@ -69,16 +69,11 @@ def body_charts(book: Book, machine: Machine) -> str:
 
 def leg_charts(book: Book, machine: Machine, listed: Sequence[Shown], valves: bool = False) -> str:
     """Quantities of every leg, the legs side by side."""
-    rows = []
-    for q in listed:
-        rows.append([_of_leg(book, machine, leg, q) for leg in machine.mechanism.legs])
+    legs = machine.mechanism.legs
+    rows = [[_of_leg(book, machine, leg, q) for leg in legs] for q in listed]
     if valves:
-        rows.append(
-            [
-                book.add(*valve_chart(book, leg, _stands(book.tracks, machine, leg)))
-                for leg in machine.mechanism.legs
-            ]
-        )
+        stands = {leg: _stands(book.tracks, machine, leg) for leg in legs}
+        rows.append([book.add(*valve_chart(book, leg, own)) for leg, own in stands.items()])
     figures = (figure for row in rows for figure in row if any(row))
     return f'<div class="grid legs">{"".join(figures)}</div>'
 
@@ -120,9 +115,8 @@ def _pair(
             for i, v in values.items()
             if book.tracks[i] is not plan
         ]
-        yield Chart(
-            f"{title}, error", q.error, errors, stands=stands, small=True, least=q.error_least
-        )
+        least = q.error_least
+        yield Chart(f"{title}, error", q.error, errors, stands=stands, small=True, least=least)
 
 
 def valve_chart(book: Book, leg: str, stands: Spans) -> Iterable[Chart]:
@@ -215,10 +209,5 @@ def _fault(t: Trajectory, machine: Machine, plan: Trajectory | None) -> str | No
 
 def marks_of(listed: Sequence[Events | None]) -> list[tuple[float, int]]:
     """Touchdowns as vertical lines: time [s] and the number of the motion."""
-    return [
-        (round(time, 4), i)
-        for i, events in enumerate(listed)
-        if events
-        for times in events.touchdowns.values()
-        for time in times
-    ]
+    each = ((i, times) for i, e in enumerate(listed) if e for times in e.touchdowns.values())
+    return [(round(time, 4), i) for i, times in each for time in times]

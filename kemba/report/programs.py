@@ -41,10 +41,8 @@ class Named:
 
 
 def programs(task: Task, document: Document, plan: Trajectory | None = None) -> Iterator[Named]:
-    """The programs of a task; the refined one only where there is a refined `plan`.
-
-    Raises KembaError for mistakes in the task, and where the plan was not refined.
-    """
+    """The programs of a task; the refined one only where there is a refined `plan`. Raises
+    KembaError for mistakes in the task, and where the plan was not refined."""
     model = task_model(task, document=document)
     yield relaxed(task, model, document)
     if plan is not None:

@@ -334,12 +334,11 @@ def page_of(given: Material) -> tuple[str, str, ReviewVerdict]:
     parts = [verdict.html()]
     if tracks:
         book = Book(grid_of(tracks), tracks, marks_of(events))
-        motion = (
-            _robot_parts(given, book, machine)
-            if machine
-            else [section("Tests", book.key(), rig_charts(book))]
-        )
-        parts += [section("Events", event_table(tracks, events)), *motion]
+        parts.append(section("Events", event_table(tracks, events)))
+        if machine:
+            parts += _robot_parts(given, book, machine)
+        else:
+            parts.append(section("Tests", book.key(), rig_charts(book)))
         parts.append(_errors(given, book))
     parts.append(_found(given))
     if given.run:
@@ -359,9 +358,8 @@ def _robot_parts(given: Material, book: Book, machine: Machine) -> list[str]:
     model = build_model(load_spec(given.model), supply=given.supply, scene=given.scene)
     certificate = given.run.certificate if given.run else {}
     plan = plan_of(book.tracks)
-    below = (
-        "Below each figure: the difference from the plan. " if plan and len(book.tracks) > 1 else ""
-    )
+    below = "Below each figure: the difference from the plan. "
+    below = below if plan and len(book.tracks) > 1 else ""
     how = (
         '<p class="soft screen">Dotted vertical lines: touchdowns. Grey: a foot stands in the '
         f"first motion. {below}Drag to zoom, double click or Escape to see all again; arrow keys "

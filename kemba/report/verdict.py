@@ -39,13 +39,8 @@ class ReviewVerdict:
 
     def json(self) -> dict[str, str]:
         """As `review` and `report` print it with `--json`."""
-        return {
-            "verdict": self.grade,
-            "sentence": self.sentence,
-            "doubt": self.doubt,
-            "next": self.next,
-            "command": self.command,
-        }
+        own = {name: getattr(self, name) for name in ("sentence", "doubt", "next", "command")}
+        return {"verdict": self.grade, **own}
 
     def html(self) -> str:
         """As the first thing on the page."""
@@ -65,9 +60,8 @@ def of_plan(certificate: Facts, run: str, events: Events | None) -> ReviewVerdic
         if not sentence.startswith("FAILED"):
             sentence = f"FAILED: {sentence}"
         return ReviewVerdict("bad", _stop(sentence), _after_failure(certificate))
-    feet = ""
-    if events and events.feet is not None:
-        feet = f"; the feet rise {100 * events.feet:.1f} cm"
+    rise = events.feet if events else None
+    feet = "" if rise is None else f"; the feet rise {100 * rise:.1f} cm"
     plant = certificate.get("plant_replay")
     robot = "no simulated robot has tried it"
     if plant:
@@ -132,34 +126,23 @@ def of_logs(
         said = of_answer(answer, words)
         return ReviewVerdict(said.grade, _joined([*parts, said.sentence]), said.next, said.command)
     if found is None:
-        return ReviewVerdict(
-            "fair", _joined(parts), "compare it with a model:", "kemba-opt compare"
-        )
+        aim = "compare it with a model:"
+        return ReviewVerdict("fair", _joined(parts), aim, "kemba-opt compare")
     ratio = f"{short(found.noise_ratio)} times the noise"
     if found.good:
-        return ReviewVerdict(
-            "good",
-            _joined([*parts, f"the model explains the logs to within the noise ({ratio})"]),
-            f"nothing is to be added to the model{_jump(words)}.",
-        )
+        text = f"the model explains the logs to within the noise ({ratio})"
+        aim = f"nothing is to be added to the model{_jump(words)}."
+        return ReviewVerdict("good", _joined([*parts, text]), aim)
     if found.tolerable:
         text = f"the model errs by {ratio}, no more than its nominal figures may be off"
         aim = "go on with this model, or identify its figures:"
-        return ReviewVerdict(
-            "fair", _joined([*parts, text]), aim, f"kemba-opt discover {words['logs']}"
-        )
-    return ReviewVerdict(
-        "fair",
-        _joined([*parts, f"the model {found.grade} the logs: its error is {ratio}{_where(found)}"]),
-        "find what the model lacks:",
-        f"kemba-opt discover {words['logs']}",
-    )
-
-
-def _where(found: Comparison) -> str:
-    """The condition that stands out most, where any does."""
-    bad = found.worst
-    return f"; worst: {place_of(bad)} ({short(bad.ratio)} times)" if bad else ""
+    else:
+        bad = found.worst
+        where = f"; worst: {place_of(bad)} ({short(bad.ratio)} times)" if bad else ""
+        text = f"the model {found.grade} the logs: its error is {ratio}{where}"
+        aim = "find what the model lacks:"
+    command = f"kemba-opt discover {words['logs']}"
+    return ReviewVerdict("fair", _joined([*parts, text]), aim, command)
 
 
 def of_bad_data(text: str, words: Mapping[str, str]) -> ReviewVerdict:
@@ -182,25 +165,20 @@ def of_answer(answer: Facts, words: Mapping[str, str]) -> ReviewVerdict:
         before, after = answer.get("error_before"), answer.get("error_after")
         falls = ""
         if isinstance(before, int | float) and isinstance(after, int | float):
-            them = "them" if len(added) > 1 else "it"
-            falls = (
-                f"; with {them} the error falls from {before:.2f} to {after:.2f} times the noise"
-            )
+            them, error = "them" if len(added) > 1 else "it", f"{before:.2f} to {after:.2f}"
+            falls = f"; with {them} the error falls from {error} times the noise"
         rest = ", and something more that is not known" if verdict == "partly" else ""
+        said = f"The model lacks {names}{rest}{falls}."
         if not answer.get("model"):
-            return ReviewVerdict(
-                "fair", f"The model lacks {names}{rest}{falls}.", "take more logs."
-            )
-        aim = "plan again with the corrected model:"
-        task = words.get("task", "jump.yaml")
-        command = f"kemba-opt solve {task} --model {folder}/model.yaml"
+            return ReviewVerdict("fair", said, "take more logs.")
         if added and all(name.startswith("sensor_") for name in added):
             aim = "correct the sensors, or their columns with a map (--map); no plan changes."
-            return ReviewVerdict("fair", f"The model lacks {names}{rest}{falls}.", aim)
+            return ReviewVerdict("fair", said, aim)
         if "rig" in words:
             aim = "see what the corrected model leaves of the error:"
-            command = f"kemba-opt compare {words['rig']}"
-        return ReviewVerdict("fair", f"The model lacks {names}{rest}{falls}.", aim, command)
+            return ReviewVerdict("fair", said, aim, f"kemba-opt compare {words['rig']}")
+        command = f"kemba-opt solve {words.get('task', 'jump.yaml')} --model {folder}/model.yaml"
+        return ReviewVerdict("fair", said, "plan again with the corrected model:", command)
     if verdict == "nothing":
         return ReviewVerdict("good", own, f"nothing is to be added to the model{_jump(words)}.")
     if verdict == "bad-data":

@@ -3,7 +3,6 @@
 https://rerun.io; `rerun-sdk` is imported when a recording is asked for.
 """
 
-import json
 from collections.abc import Iterator
 from html import escape
 from pathlib import Path
@@ -14,10 +13,11 @@ import numpy as np
 
 import kemba
 from kemba.errors import KembaError
-from kemba.files import atomic_path, atomic_text, plain
+from kemba.files import atomic_path, atomic_text
 from kemba.folders import fresh, place_for
 from kemba.logs import load_map
 from kemba.plotting.source import CYLINDER, Pose, Source, load_source, machine_of, poses
+from kemba.report.charts import script_text
 from kemba.trajectory import Array
 
 PAGES = Path(__file__).parent / "pages"
@@ -59,36 +59,21 @@ def shown(
 def stage(
     source: Source, model: str | None = None, ghost: Source | None = None, name: str = ""
 ) -> str:
-    """The viewer with its scene as HTML; `ghost`: a second motion, drawn pale.
-
-    Raises KembaError when columns are missing.
-    """
+    """The viewer with its scene as HTML; `ghost`: a second motion, drawn pale. Raises KembaError
+    when columns are missing."""
     shown = scene(source, model, ghost)
     who = f"Shown: {name or source.name}."
     if ghost is not None:
         who += f" Pale blue: {'the plan' if ghost.plan else ghost.name}."
     high = max(centre[1] for centre in shown["motions"][0]["centres"])
     alt = f"{who} The robot in 3-D from the side; its body rises to {high:.2f} m."
-    return fill(
-        "stage.html",
-        who=escape(who),
-        alt=escape(alt),
-        viewer=page_text("viewer.js"),
-        scene=script_text(shown),
-    )
-
-
-def script_text(data: dict[str, Any]) -> str:
-    """Data as JSON that can stand within a script: no name in it can end the script."""
-    text = json.dumps(plain(data), separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c")
+    code = {"viewer": page_text("viewer.js"), "scene": script_text(shown)}
+    return fill("stage.html", who=escape(who), alt=escape(alt), **code)
 
 
 def scene(source: Source, model: str | None = None, ghost: Source | None = None) -> dict[str, Any]:
-    """Times [s]; of every robot points [m], valves and contacts; the size [m] of it all.
-
-    Raises KembaError where columns are missing.
-    """
+    """Times [s]; of every robot points [m], valves and contacts; the size [m] of it all. Raises
+    KembaError where columns are missing."""
     machine = machine_of(source, model)
     times = _times(source, ghost)
     shown = [poses(one, machine, times) for one in (source, ghost) if one and not one.bench]

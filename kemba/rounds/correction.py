@@ -144,10 +144,8 @@ class Aim:
     correction: Correction
 
     def expected(self, table: Trajectory, rest: float) -> tuple[FlownJump, bool]:
-        """The flight to expect of a table, and whether its simulation lands as planned.
-
-        Raises KembaError where the table cannot be simulated.
-        """
+        """The flight to expect of a table, and whether its simulation lands as planned. Raises
+        KembaError where the table cannot be simulated."""
         done = execute(table, self.model, extra=rest)
         seen, add = flight_of(done.trajectory, self.machine), self.correction
         lands = done.against(self.model, self.plan).landed

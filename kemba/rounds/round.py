@@ -71,10 +71,8 @@ class Past:
 def past_of(
     runs: Sequence[str | Path], logs: Sequence[Trajectory], holdout: Iterable[str | Path] = ()
 ) -> Past:
-    """The runs in the order of their rounds, with their logs; earlier logs join in.
-
-    Raises KembaError where a log is of none of the runs, or a held-out log was learnt from.
-    """
+    """The runs in the order of their rounds, with their logs; earlier logs join in. Raises
+    KembaError where a log is of none of the runs, or a held-out log was learnt from."""
     found = sorted((load_run(run) for run in runs), key=_round)
     executed: dict[int, list[Trajectory]] = {}
     for log in logs:

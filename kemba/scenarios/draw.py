@@ -253,10 +253,8 @@ def load_uncertainties(name: str | Path) -> tuple[Uncertainties, Document]:
 
 
 def scenarios(name: str | Path, plant: Model, count: int) -> list[Scenario]:
-    """`count` scenarios of the uncertainties `name` on a plant, by Latin hypercube sampling.
-
-    Raises KembaError where a key does not fit the plant.
-    """
+    """`count` scenarios of the uncertainties `name` on a plant, by Latin hypercube sampling. Raises
+    KembaError where a key does not fit the plant."""
     asked, document = load_uncertainties(name)
     vary: dict[str, Spread] = {}
     for key, spread in asked.vary.items():

@@ -67,9 +67,8 @@ def words_of(file: Path) -> str:
             return "feedback whose parts were not tried"
         ways, succeeded, ended, of = (data[key].tolist() for key in KEPT)
     best = ways[int(np.argmax(np.add(succeeded, ended)))]
-    counts = ", ".join(
-        f"{way} {n} and {m}" for way, n, m in zip(ways, succeeded, ended, strict=True)
-    )
+    each = zip(ways, succeeded, ended, strict=True)
+    counts = ", ".join(f"{way} {n} and {m}" for way, n, m in each)
     return f"feedback by {best} (of {of} executions succeed, and end in place: {counts})"
 
 

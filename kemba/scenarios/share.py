@@ -37,13 +37,8 @@ class Share:
 
     def summary(self) -> dict[str, Any]:
         """The entry `robust` of the certificate."""
-        return {
-            "n": self.n,
-            "landed": self.landed,
-            "wilson": list(self.wilson),
-            "worst": self.worst,
-            "apex_sigma_m": self.apex_sigma,
-        }
+        own = {"n": self.n, "landed": self.landed, "wilson": list(self.wilson)}
+        return {**own, "worst": self.worst, "apex_sigma_m": self.apex_sigma}
 
     @property
     def sentence(self) -> str:

@@ -202,10 +202,6 @@ class Ground:
         heights = self.height(np.linspace(-5.0, 5.0, 2001))
         return float(heights.min()), float(heights.max())
 
-    def highest(self, a: float, b: float) -> float:
-        """The greatest height [m] between two places."""
-        return float(np.max(self.height(np.linspace(a, b, 201))))
-
     def line(self, a: float, b: float) -> tuple[np.ndarray, np.ndarray]:
         """Places and heights (n,) [m] from `a` to `b` that draw it."""
         x = np.linspace(a, b, 2 if self.level is not None else max(2, int((b - a) / EDGE * 4)))

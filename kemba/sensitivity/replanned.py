@@ -139,11 +139,7 @@ class Replanned:
 
 
 def of_plan(
-    task: Task,
-    model: Model,
-    plan: Trajectory,
-    stages: Stages | None,
-    changed: Sequence[FigureStep],
+    task: Task, model: Model, plan: Trajectory, stages: Stages | None, changed: Sequence[FigureStep]
 ) -> list[Replanned]:
     """For every figure of `changed`, what one step of it changes; see `Replanned`. `stages`: the
     solved program of the plan, if it is at hand. Raises KembaError where it was not refined."""

@@ -17,12 +17,7 @@ from kemba.ocp.task.task import Task
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import Execution, execute_many
 from kemba.runs import STAGES, load_run
-from kemba.sensitivity.replanned import (
-    FigureStep,
-    Replanned,
-    figures,
-    of_plan,
-)
+from kemba.sensitivity.replanned import FigureStep, Replanned, figures, of_plan
 from kemba.trajectory import Trajectory
 
 NAN = float("nan")
@@ -70,13 +65,8 @@ def _difference(
     late = [np.nan if r.touchdown_error_s is None else r.touchdown_error_s for r in (first, second)]
     ends = [[run.trajectory[name][-1] for name in ("body/x", "body/z")] for run in (first, second)]
     x, z = (float(b - a) for a, b in zip(*ends, strict=True))
-    return Shift(
-        apex=second.apex_error_m - first.apex_error_m,
-        touchdown=float(late[1] - late[0]),
-        end_x=x,
-        end_z=z,
-        lands=first.landed and second.landed,
-    )
+    apex, lands = second.apex_error_m - first.apex_error_m, first.landed and second.landed
+    return Shift(apex, touchdown=float(late[1] - late[0]), end_x=x, end_z=z, lands=lands)
 
 
 HEADER = (

@@ -9,18 +9,11 @@ from kemba.runs import STAGES, load_run
 
 
 def origin_of(run: str | Path) -> Origin:
-    """Plan, model and requirements of a run folder.
-
-    Raises KembaError where the folder is no run, has no plan, or its model is gone.
-    """
+    """Plan, model and requirements of a run folder. Raises KembaError where the folder is no run,
+    has no plan, or its model is gone."""
     found = load_run(run)
     plan = found.trajectory
     task, document = load_task(found.task)
     model = task_model(task)
-    return Origin(
-        plan,
-        model,
-        tuple(resolve(task, model, document)),
-        stages=read_stages(found.path / STAGES),
-        run=str(run),
-    )
+    asked, stages = tuple(resolve(task, model, document)), read_stages(found.path / STAGES)
+    return Origin(plan, model, asked, stages=stages, run=str(run))

@@ -104,10 +104,7 @@ def plant_of(task: Task) -> Model:
 
 
 def judged(
-    found: Plan,
-    table: Trajectory,
-    plant: Model | None = None,
-    tell: Tell = silent,
+    found: Plan, table: Trajectory, plant: Model | None = None, tell: Tell = silent
 ) -> Judged:
     """Execute a plan and its table, on its model and on the plant, and judge them by its task.
 

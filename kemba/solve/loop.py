@@ -61,13 +61,9 @@ def _on_ticks(old: Plan, planning: Planning) -> Plan | None:
     name = "the earlier plan" if old.continued else "the same plan with edges between ticks"
     origin = Origin(*known, name, once=True, ticks=True, stages=old.stages)
     near, _ = planning.continued(origin)
-    if near is None or near.status is not Status.SOLVED:
+    if near is None or near.status is not Status.SOLVED or dear(near, old.objective):
         return None
-    return (
-        None
-        if dear(near, old.objective)
-        else replace(near, continued=old.continued, start=old.start)
-    )
+    return replace(near, continued=old.continued, start=old.start)
 
 
 UNTRIED = "the time limit came before it was executed in any scenario"
@@ -112,11 +108,7 @@ class PlanCandidate:
 
 
 def best_plan(
-    task: Task,
-    document: Document,
-    approach: Approach,
-    listener: Listener,
-    place: str = "",
+    task: Task, document: Document, approach: Approach, listener: Listener, place: str = ""
 ) -> Trial:
     """The plan of a task, executed and judged: the first good one, or the best of all tried.
 

@@ -67,10 +67,8 @@ def recalled(task: Task, model: Model, tell: Tell) -> Origin | None:
             origin = origin_of(one.run)
         except (KembaError, OSError, ValueError):  # moved, changed or removed since, or no name
             continue
-        hint = "one from a guess (--no-memory) may take less"
-        return replace(
-            origin, name=f"the earlier plan {one.run}", dear=hint, once=True, given=False
-        )
+        name, hint = f"the earlier plan {one.run}", "one from a guess (--no-memory) may take less"
+        return replace(origin, name=name, dear=hint, once=True, given=False)
     return None
 
 
@@ -113,14 +111,9 @@ def _listed(file: Path, tell: Tell) -> Iterator[Remembered]:
     except (OSError, ValueError) as error:
         tell(f"{file} cannot be read and is left out: {error}")
         return
-    damaged = 0
-    for line in lines:
-        one = _entry(line)
-        if one is None:
-            damaged += 1
-        else:
-            yield one
-    if damaged:
+    entries = [_entry(line) for line in lines]
+    yield from (one for one in entries if one is not None)
+    if damaged := entries.count(None):
         tell(f"{damaged} entries of {file} cannot be read and are left out")
 
 

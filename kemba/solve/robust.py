@@ -58,11 +58,7 @@ class RobustCandidate:
 
 
 def most_robust(
-    task: Task,
-    solve: Solve,
-    change: Change,
-    tell: Callable[[str], None],
-    deadline: float = np.inf,
+    task: Task, solve: Solve, change: Change, tell: Callable[[str], None], deadline: float = np.inf
 ) -> RobustCandidate:
     """The plan that succeeds in most of `task.robust` scenarios of `task.uncertainties`.
 

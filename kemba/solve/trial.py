@@ -72,11 +72,8 @@ class Trial:
     @property
     def table_misses(self) -> bool:
         """Whether of its own model's executions only that of the table misses."""
-        return (
-            self.judged is not None
-            and self.judged.verdicts["replay"].good
-            and not self.judged.replays
-        )
+        done = self.judged
+        return done is not None and done.verdicts["replay"].good and not done.replays
 
     @property
     def misses(self) -> float:

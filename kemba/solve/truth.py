@@ -102,18 +102,14 @@ def _listed(effects: Iterable[str]) -> str:
 def beyond(found: Plan, evidence: Evidence) -> list[str]:
     """What of a plan lies outside of what the logs of its model have, a sentence each."""
     plan, legs = found.trajectory, found.model.mechanism.legs
-    speed = float(np.hypot(plan["body/vx"], plan["body/vz"]).max())
+    apex, speed = plan["body/z"].max(), np.hypot(plan["body/vx"], plan["body/vz"]).max()
     pairs = [(plan[f"{leg}/valve/extend"], plan[f"{leg}/valve/retract"]) for leg in legs]
     modes = {f"{e:.0f}{r:.0f}" for pair in pairs for e, r in zip(*pair, strict=True)}
-    load = found.task.payload
-    sentences = evidence.beyond(
-        apex=float(plan["body/z"].max()), speed=speed, supply=found.model.supply, modes=modes
-    )
-    known = evidence.measured.payload or 0.0
+    sentences = evidence.beyond(float(apex), float(speed), found.model.supply, modes)
+    load, known = found.task.payload, evidence.measured.payload or 0.0
     if abs(load - known) > 1e-9:
-        sentences.append(
-            f"beyond what was measured: payload {load:g} kg, the logs were taken with {known:g} kg"
-        )
+        other = f"payload {load:g} kg, the logs were taken with {known:g} kg"
+        sentences.append(f"beyond what was measured: {other}")
     return sentences
 
 

@@ -66,10 +66,8 @@ def allowances(tolerances: Tolerances, landing_speed: float) -> dict[str, Allowe
     `landing_speed` [m/s] of the plan: what the plant's apex may err makes its touchdown early or
     late by that length over this speed.
     """
-    t = tolerances
-    late = t.plant_touchdown
-    if late is None:
-        late = min(SLOWEST, t.plant_apex / max(landing_speed, 1e-9))
+    t, usual = tolerances, min(SLOWEST, tolerances.plant_apex / max(landing_speed, 1e-9))
+    late = usual if t.plant_touchdown is None else t.plant_touchdown
     return {
         "replay": Allowed(t.apex, t.touchdown, t.final),
         "table_replay": Allowed(t.table_apex, t.table_touchdown, t.table_final),
@@ -130,10 +128,8 @@ def _figures(done: Replay, allowed: Allowed) -> Iterator[_Figure]:
                       f"is turned by {{}} at the {which}apex")  # fmt: skip
     for landing in landings:
         side = "late" if landing.late >= 0 else "early"
-        feet = (
-            f" with the {enumerated(landing.legs)} {'foot' if len(landing.legs) == 1 else 'feet'}"
-        )
-        which = feet if len(landings) > 1 else ""
+        feet = f"{enumerated(landing.legs)} {'foot' if len(landing.legs) == 1 else 'feet'}"
+        which = f" with the {feet}" if len(landings) > 1 else ""
         yield _figure(landing.late, allowed.touchdown, "ms", f"touchdown{which} {{}} {side}",
                       f"touches down{which} {{}} {side}")  # fmt: skip
     yield _figure(done.final_error_m, allowed.final, "mm", "end {} away", "ends {} from the plan")
@@ -173,13 +169,6 @@ def _figure(error: float, allowed: float, unit: str, match: str, miss: str) -> _
     text = f"{abs(factor * error):.{digits}f}"
     limit = f"{factor * allowed:.3g} {unit} allowed"
     match, miss = (words.format(f"{text} {unit}") for words in (match, miss))
-    return _Figure(
-        _share(error, allowed), f"{match}, {limit}", f"{miss} ({limit})", float(text) != 0.0
-    )
-
-
-def _share(error: float, allowed: float) -> float:
-    """The size of an error in units of what is allowed; infinite where nothing is."""
-    if allowed > 0.0:
-        return abs(error) / allowed
-    return float("inf") if error else 0.0
+    nothing = math.inf if error else 0.0  # as a share where nothing is allowed
+    share = abs(error) / allowed if allowed > 0.0 else nothing
+    return _Figure(share, f"{match}, {limit}", f"{miss} ({limit})", float(text) != 0.0)

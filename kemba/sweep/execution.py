@@ -33,19 +33,17 @@ from kemba.trajectory import Trajectory
 
 
 def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: Path) -> list[Case]:
-    """The cases of a block; its plan is made first where it is missing.
-
-    Raises KembaError where a condition does not fit the model.
-    """
-    plant, planned = (
-        model_name(expansion, m) for m in (block.plant, _model(expansion, name, block))
-    )
+    """The cases of a block; its plan is made first where it is missing. Raises KembaError where a
+    condition does not fit the model."""
+    task = _task_data(expansion, name, block)
+    plant, planned = model_name(expansion, block.plant), model_name(expansion, task["model"])
+    made_for = {key: task[key] for key in ("supply", "payload") if task.get(key) is not None}
     given = block.conditions.model_dump(exclude_none=True, exclude_unset=True)
-    base = Document({**_planned(expansion, name, block), **given})
-    works = []
-    for values in sample(block, name, expansion.sweep.seed):
-        conditions = parse(expansion.varied(base, name, values), Conditions)
-        works.append((values, conditions))
+    base = Document({**made_for, **given})
+    works = [
+        (values, parse(expansion.varied(base, name, values), Conditions))
+        for values in sample(block, name, expansion.sweep.seed)
+    ]
     model = counterpart(planned, plant=plant)
     try:
         for _, conditions in works:
@@ -70,23 +68,14 @@ def execute_cases(expansion: Expansion, name: str, block: ExecuteBlock, folder: 
     ]  # fmt: skip
 
 
-def _planned(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, Any]:
-    """Supply and payload that the plan was made for: conditions unless the sweep says others."""
+def _task_data(expansion: Expansion, name: str, block: ExecuteBlock) -> dict[str, Any]:
+    """The task that the plan was made for. The robot and own effects of its `model` are the plant's
+    too; its supply and payload are conditions unless the sweep says others."""
     if block.run is None:
-        task = expansion.task_document(name).data
-    else:
-        file = _run_folder(expansion, block.run) / "task.yaml"
-        task = load_yaml(file).data if file.is_file() else {}
-    return {key: task[key] for key in ("supply", "payload") if task.get(key) is not None}
-
-
-def _model(expansion: Expansion, name: str, block: ExecuteBlock) -> str:
-    """The model that the plan was made with: its robot and own effects are the plant's too."""
-    if block.run is None:
-        return parse_task(expansion.task_document(name)).model
+        document = expansion.task_document(name)
+        return {**document.data, "model": parse_task(document).model}
     file = _run_folder(expansion, block.run) / "task.yaml"
-    task = load_yaml(file).data if file.is_file() else {}
-    return str(task.get("model", PLAIN))
+    return {"model": PLAIN, **(load_yaml(file).data if file.is_file() else {})}
 
 
 def _run_folder(expansion: Expansion, run: str) -> Path:

@@ -143,12 +143,8 @@ def spread(values: Iterable[float]) -> dict[str, float] | None:
     numbers = np.array(list(values), dtype=float)
     if not len(numbers):
         return None
-    return {
-        "min": float(numbers.min()),
-        "median": float(np.median(numbers)),
-        "p90": float(np.percentile(numbers, 90)),
-        "max": float(numbers.max()),
-    }
+    low, median, p90, high = np.percentile(numbers, [0, 50, 90, 100]).tolist()
+    return {"min": low, "median": median, "p90": p90, "max": high}
 
 
 def _column(rows: Rows, name: str) -> list[float]:
@@ -189,10 +185,8 @@ FIGURES = (
 
 
 def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Path:
-    """The folder of a sweep, `sweeps/<name>` by default; an existing one is continued.
-
-    Raises KembaError when it holds something else, or another sweep.
-    """
+    """The folder of a sweep, `sweeps/<name>` by default; an existing one is continued. Raises
+    KembaError when it holds something else, or another sweep."""
     path = Path("sweeps") / sweep.name if out is None else Path(out)
     manifest = path / MANIFEST
     if path.exists() and not path.is_dir():
@@ -204,15 +198,8 @@ def open_folder(out: str | Path | None, sweep: Sweep, document: Document) -> Pat
                 f"holds the sweep '{known['sweep']}'" if "sweep" in known else "holds other files"
             )
             raise KembaError(f"--out {path}", what, hint="give another --out")
-    facts = {
-        "sweep": sweep.name,
-        "status": "running",
-        "command": sys.argv,
-        "started": now(),
-        "machine": machine(),
-        "versions": versions(),
-    }
-    write_json(manifest, facts)
+    facts = {"sweep": sweep.name, "status": "running", "command": sys.argv, "started": now()}
+    write_json(manifest, {**facts, "machine": machine(), "versions": versions()})
     dump_yaml(document.data, path / "sweep.yaml")
     return path
 

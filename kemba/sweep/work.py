@@ -38,11 +38,6 @@ def execute_case(work: Work) -> Record:
     sentence = f"{status}: apex {apex:.3f} m, {1e3 * replay.apex_error_m:+.0f} mm against the plan"
     if replay.fault:
         sentence += f", {replay.fault}"
-    return {
-        "status": status,
-        "good": replay.landed,
-        "sentence": sentence,
-        "apex_m": apex,
-        **replay.summary(),
-        "pitch_rad": float(replay.trajectory["body/pitch"][-1]),
-    }
+    facts = {"status": status, "good": replay.landed, "sentence": sentence, "apex_m": apex}
+    pitch = float(replay.trajectory["body/pitch"][-1])
+    return {**facts, **replay.summary(), "pitch_rad": pitch}

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Annotated, ClassVar
 
 from kemba.effects.base import At, BoomEffect, Contribution, Effect
-from kemba.effects.mechanics.laws import direction
+from kemba.effects.mechanics.laws import coulomb, viscous
 from kemba.effects.sensors import SensorEffect, SensorScale
 from kemba.quantity import Param, Tolerance
 
@@ -94,9 +94,7 @@ class BoomInertia(BoomEffect):
     source = "paper II-B: 4.82 kg.m2 about the central pivot"
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(
-            effort={"body_x": -self.m * at.body_x.a, "body_z": -self.m * at.body_z.a}
-        )
+        return Contribution(effort={p: -self.m * getattr(at, p).a for p in self.ports})
 
 
 class BoomFriction(BoomEffect):
@@ -109,12 +107,8 @@ class BoomFriction(BoomEffect):
     dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(
-            effort={
-                "body_x": -self.F * direction(at.body_x.v, V_BOOM),
-                "body_z": -self.F * direction(at.body_z.v, V_BOOM),
-            }
-        )
+        force = {port: coulomb(self.F, getattr(at, port).v, V_BOOM) for port in self.ports}
+        return Contribution(effort=force)
 
 
 class BoomDamping(BoomEffect):
@@ -127,9 +121,7 @@ class BoomDamping(BoomEffect):
     dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(
-            effort={"body_x": -self.b * at.body_x.v, "body_z": -self.b * at.body_z.v}
-        )
+        return Contribution(effort={p: viscous(self.b, getattr(at, p).v) for p in self.ports})
 
 
 class BoomSpring(BoomEffect):
@@ -158,4 +150,4 @@ class PitchFriction(BoomEffect):
     dissipative = True
 
     def evaluate(self, at: At) -> Contribution:
-        return Contribution(effort={"pitch": -self.T * direction(at.pitch.v, W_PITCH)})
+        return Contribution(effort={"pitch": coulomb(self.T, at.pitch.v, W_PITCH)})

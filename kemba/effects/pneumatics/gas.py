@@ -63,10 +63,9 @@ class GasTemperature(Effect):
     publishes = ("gas",)
 
     def states(self) -> dict[str, Quantity]:
+        sizes = 120.0, 700.0, 50.0, TEMPERATURE
         return {
-            f"T_{side[0]}": Quantity(
-                f"chamber/{side}/T", "K", 120.0, 700.0, 50.0, TEMPERATURE, f"air in {side}"
-            )
+            f"T_{side[0]}": Quantity(f"chamber/{side}/T", "K", *sizes, f"air in {side}")
             for side in ("extend", "retract")
         }
 

@@ -73,14 +73,10 @@ class OrificeChamber(Effect):
         return beyond(self, supply, ("gauge",))
 
     def states(self) -> dict[str, Quantity]:
-        low, high, size = 1e4, 3e6, 2e5
+        sizes = 1e4, 3e6, 2e5, ATMOSPHERE
         return {
-            "P_e": Quantity(
-                "chamber/extend/P", "Pa", low, high, size, ATMOSPHERE, "extend, absolute"
-            ),
-            "P_r": Quantity(
-                "chamber/retract/P", "Pa", low, high, size, ATMOSPHERE, "retract, absolute"
-            ),
+            f"P_{side[0]}": Quantity(f"chamber/{side}/P", "Pa", *sizes, f"{side}, absolute")
+            for side in ("extend", "retract")
         }
 
     def rate(self, P: Any, V: Any, dV: Any, inflow: Any) -> Any:

@@ -52,10 +52,8 @@ def at_supply(effect: Effect, table: str, supply: Any) -> Any:
 
 
 def beyond(effect: Effect, supply: float, tables: Sequence[str]) -> list[str]:
-    """Remarks on a supply pressure [Pa] outside an effect's tables; nothing inside them.
-
-    Raises KembaError where what is extrapolated is not positive, which is physically impossible.
-    """
+    """Remarks on a supply pressure [Pa] outside an effect's tables; nothing inside them. Raises
+    KembaError where what is extrapolated is not positive, which is physically impossible."""
     low, high = min(effect.value("pressures")), max(effect.value("pressures"))
     if low <= supply <= high:
         return []

@@ -21,7 +21,7 @@ from kemba.model import Model
 from kemba.ocp.task.expressions import along
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.solution import arrays, groups
+from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import rigid_constraints
 from kemba.trajectory import Array, Trajectory
@@ -74,15 +74,9 @@ class MeasuredRequirement:
 
     def json(self) -> dict[str, Any]:
         """The entry of the certificate."""
-        return {
-            "line": self.line,
-            "text": self.text,
-            "value": self.value if np.isfinite(self.value) else None,
-            "lower": self.lower if np.isfinite(self.lower) else None,
-            "upper": self.upper if np.isfinite(self.upper) else None,
-            "unit": self.unit,
-            "met": self.met,
-        }
+        numbers = {"value": self.value, "lower": self.lower, "upper": self.upper}
+        known = {name: x if np.isfinite(x) else None for name, x in numbers.items()}
+        return {"line": self.line, "text": self.text, **known, "unit": self.unit, "met": self.met}
 
 
 def measured(
@@ -121,9 +115,7 @@ def on_execution(
         if quantity.unit not in ("m", "rad") or requirement.minus is not None:
             continue
         there = along(quantity.name, real)
-        if there is None:
-            continue
-        if requirement.lower == -np.inf and requirement.upper == np.inf:
+        if there is None or (requirement.lower, requirement.upper) == (-np.inf, np.inf):
             continue
         if requirement.at is not None:
             time = np.array([clock[requirement.node(len(plan) - 1)]])
@@ -152,8 +144,7 @@ def _on_plan(
     exact += 0.0 if "phases" in plan.meta else requirement.loose
     values = _values(requirement, plan)
     if values is None:
-        blank = np.array([np.nan])
-        return _worst(requirement, blank, plan.time[[-1]], exact)
+        return _worst(requirement, np.array([np.nan]), plan.time[[-1]], exact)
     at = np.array(requirement.nodes(last))
     nodes = _worst(requirement, values[at], plan.time[at], exact, at)
     if requirement.at is not None or name not in course.values or not nodes.met:
@@ -178,11 +169,7 @@ def _values(requirement: Requirement, plan: Trajectory) -> Array | None:
 
 
 def _worst(
-    requirement: Requirement,
-    values: Array,
-    time: Array,
-    allowed: float,
-    nodes: Array | None = None,
+    requirement: Requirement, values: Array, time: Array, allowed: float, nodes: Array | None = None
 ) -> MeasuredRequirement:
     """The value furthest beyond the limits of a requirement, or nearest to them."""
     beyond = np.maximum(requirement.lower - values, values - requirement.upper)
@@ -301,7 +288,7 @@ def _stances_in_order(task: Task, plan: Trajectory) -> int:
 def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:
     """The shortest time [s] between two switches of one valve; None where none switches twice."""
     found = []
-    for name in (q.name for q in groups(model)["u"] if q.binary):
+    for name in (q.name for q in model.inputs.values() if q.binary):
         edges = plan.time[:-1][np.flatnonzero(np.diff(plan[name][1:])) + 1]
         found += [b - a for a, b in itertools.pairwise(edges)]
     return float(min(found)) if found else None

@@ -13,7 +13,7 @@ from kemba.ocp.task.costs import running
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import CostTerm, Task, Tolerances
 from kemba.ocp.transcription.first_node import state_rows
-from kemba.ocp.transcription.solution import arrays, groups
+from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.stage import AIM, ANGLE_ARM, COST_SCALE
 from kemba.trajectory import Trajectory
 
@@ -113,13 +113,8 @@ class Measurement:
         now = {name: values[1:] for name, values in x.items()}
         at = (now["q"], now["v"], rates[0], now["s"], rates[1], now["lam"], now["u"])
         parts = model.node.residual.map(len(h))(*(m.T for m in at), [])
-        self.residual = dict(
-            zip(
-                ("dynamics", "rate", "pair_a", "pair_b", "limits"),
-                (np.array(part).T for part in parts),
-                strict=True,
-            )
-        )
+        names = ("dynamics", "rate", "pair_a", "pair_b", "limits")
+        self.residual = {n: np.array(p).T for n, p in zip(names, parts, strict=True)}
 
     def note(self, values: np.ndarray, labels: Iterable[Label], first: int = 1) -> float:
         """Keep the worst of every column of scaled violations (nodes, rows), whose nodes begin at
@@ -196,7 +191,7 @@ class Measurement:
     def boxes(self) -> float:
         """Bounds of every quantity; the first node has no inputs and forces."""
         worst = 0.0
-        for name, quantities in groups(self.model).items():
+        for name, quantities in self.model.groups.items():
             first = 0 if name in ("q", "v", "s") else 1
             values = self.x[name][first:]
             lower, upper, scale = (
@@ -227,7 +222,7 @@ def integral(cost: Mapping[str, float | CostTerm], model: Model, plan: Trajector
     """The time integral of weighted costs over a plan, by its nodes."""
     x, h, node = arrays(model, plan), np.diff(plan.time), model.node
     step = ca.SX.sym("h")
-    now = {"q": node.q, "v": node.v, "s": node.s, "u": node.u, "lam": node.lam}
+    now = {group: getattr(node, group) for group in model.groups}
     f = ca.Function("cost", [*now.values(), step], [running(model, cost, now, step)])
     return float(ca.sum2(f.map(len(h))(*(x[group][1:].T for group in now), h[None, :])))
 

@@ -206,11 +206,7 @@ def with_impacts(program: PhaseProgram, x: np.ndarray, ease: float) -> np.ndarra
 
 
 def renoded(
-    plan: Trajectory,
-    phases: Sequence[Phase],
-    nodes: int,
-    marks: Sequence[float],
-    even: bool = True,
+    plan: Trajectory, phases: Sequence[Phase], nodes: int, marks: Sequence[float], even: bool = True
 ) -> tuple[Trajectory, list[Phase]] | None:
     """The plan on `nodes` intervals and its phases there, each with intervals by how long it lasts;
     without `even` in proportion to those it has, so that what the task asks at nodes stays at the

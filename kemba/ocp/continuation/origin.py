@@ -14,7 +14,6 @@ from kemba.model.rest import told_by
 from kemba.ocp.phases.modes import Phase
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.task.requirement import Requirement
-from kemba.ocp.transcription.solution import groups
 from kemba.trajectory import Trajectory
 
 
@@ -45,11 +44,10 @@ def completed(plan: Trajectory, model: Model) -> Trajectory:
     """The plan with every column that `model` names: new states as what the plan has of outputs
     tells, such as pressures by the forces of their chambers, else at rest; new forces and inputs
     zero."""
-    listed = groups(model)
     absent = {
         q.header: np.full(len(plan), float(q.value) if name == "s" else 0.0)
         for name in ("s", "u", "lam")
-        for q in listed[name]
+        for q in model.groups[name]
         if q.name not in plan
     }
     states = list(model.states.values())

@@ -9,6 +9,7 @@ import numpy as np
 
 from kemba.cache import Recent
 from kemba.ocp.functions.code import Code, code_of
+from kemba.ocp.functions.problem import derivative
 
 Entries = tuple[ca.MX, np.ndarray, np.ndarray]  # nonzeros, their rows, their columns
 
@@ -78,7 +79,9 @@ class BlockProblem:
             cost, gradient = slope(*here)
             f += ca.sum2(cost)
             gradients.append((ca.vec(gradient), block.columns.ravel()))
-        return self._named("grad_f", [f, _gather_gradient(gradients, self.size)], "f", "grad_f_x")
+        where = np.concatenate([at for _, at in gradients])
+        gathered = ca.mtimes(_adding(where, self.size), ca.vertcat(*(g for g, _ in gradients)))
+        return derivative("grad_f", [self.x, self.parameter], [f, ca.densify(gathered)])
 
     @cached_property
     def jac_g(self) -> ca.Function:
@@ -90,7 +93,7 @@ class BlockProblem:
             parts.append(_place_jacobian(block, nonzeros, row))
             row += values.numel()
         jacobian = _scatter(parts, self.rows, self.size)
-        return self._named("jac_g", [ca.vertcat(*g), jacobian], "g", "jac_g_x")
+        return derivative("jac_g", [self.x, self.parameter], [ca.vertcat(*g), jacobian])
 
     @cached_property
     def hess_lag(self) -> ca.Function:
@@ -103,13 +106,8 @@ class BlockProblem:
             nonzeros = second(*here, lam_f, multipliers)
             parts.append(_place_hessian(block, nonzeros))
             row += m * n
-        at = {"x": self.x, "p": self.parameter, "lam_f": lam_f, "lam_g": lam_g}
         hessian = _scatter(parts, self.size, self.size)
-        result = ["triu_hess_gamma_x_x"]
-        return ca.Function("hess_lag", list(at.values()), [hessian], list(at), result)
-
-    def _named(self, name: str, results: list[ca.MX], *names: str) -> ca.Function:
-        return ca.Function(name, [self.x, self.parameter], results, ["x", "p"], list(names))
+        return derivative("hess_lag", [self.x, self.parameter, lam_f, lam_g], [hessian])
 
     @cached_property
     def _locals(self) -> list[tuple[ca.MX, ca.MX]]:
@@ -152,11 +150,6 @@ def block_problem(
 def _gather(x: ca.MX, columns: np.ndarray) -> ca.MX:
     index = columns.ravel().tolist()
     return ca.reshape(x[index], columns.shape[1], columns.shape[0])
-
-
-def _gather_gradient(parts: list[tuple[ca.MX, np.ndarray]], size: int) -> ca.MX:
-    where = np.concatenate([at for _, at in parts])
-    return ca.densify(ca.mtimes(_adding(where, size), ca.vertcat(*(nz for nz, _ in parts))))
 
 
 def _place_jacobian(block: PlacedBlock, nonzeros: ca.MX, row: int) -> Entries:

@@ -235,14 +235,9 @@ def vectorised(f: ca.Function, points: int, shared: Collection[int] = ()) -> ca.
     with _as_written():
         rows = [ca.vertsplit(x) if x.numel() else [] for x in inputs]
         outputs = replay(f, [[row.T for row in group] for group in rows], ca.MX, _applied)
-        stacked = [_stacked(found, points) for found in outputs]
+        each = [[e if e.numel() == points else ca.repmat(e, points) for e in y] for y in outputs]
+        stacked = [ca.horzcat(*rows).T if rows else ca.MX(0, points) for rows in each]
         return ca.Function(f.name(), inputs, stacked, {"never_inline": True})
-
-
-def _stacked(elements: list[ca.MX], points: int) -> ca.MX:
-    """Elements (points,), or scalars that are the same at all, as rows."""
-    rows = [e if e.numel() == points else ca.repmat(e, points) for e in elements]
-    return ca.horzcat(*rows).T if rows else ca.MX(0, points)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ forces that legs share, Newton steps become long without any gain and lose feasi
 term gives these directions curvature and hardly moves the optimum.
 """
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -23,6 +24,19 @@ class Derivatives(Protocol):
     def jac_g(self) -> ca.Function: ...
     @property
     def hess_lag(self) -> ca.Function: ...
+
+
+# of each derivative: what nlpsol gives it and takes from it
+SIGNATURES = {
+    "grad_f": (["x", "p"], ["f", "grad_f_x"]),
+    "jac_g": (["x", "p"], ["g", "jac_g_x"]),
+    "hess_lag": (["x", "p", "lam_f", "lam_g"], ["triu_hess_gamma_x_x"]),
+}
+
+
+def derivative(name: str, at: Sequence[Any], results: Sequence[Any]) -> ca.Function:
+    """`grad_f`, `jac_g` or `hess_lag` of the symbols `at`, as nlpsol takes it."""
+    return ca.Function(name, list(at), list(results), *SIGNATURES[name])
 
 
 class NlpFunctions(Derivatives, Protocol):
@@ -97,15 +111,13 @@ class Proximal:
         """(x, p) -> f and its gradient."""
         f, gradient = self.problem.grad_f(self.x, self.problem.parameter)
         results = [f + self._cost, gradient + self.weight * self.away]
-        at = [self.x, self.parameters]
-        return ca.Function("grad_f", at, results, ["x", "p"], ["f", "grad_f_x"])
+        return derivative("grad_f", [self.x, self.parameters], results)
 
     @cached_property
     def jac_g(self) -> ca.Function:
         """(x, p) -> g and its Jacobian."""
         results = self.problem.jac_g(self.x, self.problem.parameter)
-        at = [self.x, self.parameters]
-        return ca.Function("jac_g", at, list(results), ["x", "p"], ["g", "jac_g_x"])
+        return derivative("jac_g", [self.x, self.parameters], results)
 
     @cached_property
     def hess_lag(self) -> ca.Function:
@@ -113,9 +125,7 @@ class Proximal:
         lam_f, lam_g = ca.MX.sym("lam_f"), ca.MX.sym("lam_g", self.problem.rows)
         plain = self.problem.hess_lag(self.x, self.problem.parameter, lam_f, lam_g)
         hessian = plain + lam_f * self.weight * ca.MX.eye(self.problem.size)
-        at = {"x": self.x, "p": self.parameters, "lam_f": lam_f, "lam_g": lam_g}
-        result = ["triu_hess_gamma_x_x"]
-        return ca.Function("hess_lag", list(at.values()), [hessian], list(at), result)
+        return derivative("hess_lag", [self.x, self.parameters, lam_f, lam_g], [hessian])
 
     @property
     def _cost(self) -> ca.MX:

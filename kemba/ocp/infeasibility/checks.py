@@ -134,12 +134,9 @@ def air_work(model: Model) -> float:
     s = at_rest(model, q, u)
     p = np.zeros(node.p.numel())
     measured = np.array(node.measure(q, v, v, s, 0 * s, lam, u, p)).ravel()
-    forces = [
-        value
-        for quantity, value in zip(node.output_quantities, measured, strict=True)
-        if quantity.name.endswith("piston/F")
-    ]
-    return float(sum(max(f, 0.0) for f in forces) * stroke)
+    each = zip(node.output_quantities, measured, strict=True)
+    forces = (max(value, 0.0) for quantity, value in each if quantity.name.endswith("piston/F"))
+    return float(sum(forces) * stroke)
 
 
 def hip_power(model: Model) -> float:
@@ -166,8 +163,10 @@ def check_task(
     if found:
         return found
     flight = flight_of(model, requirements, poses)
-    budget = budget_diagnostics(task, model, requirements, flight, document)
-    return sorted([*coarse_grid(task, flight, document), *budget], key=lambda f: not f.certain)
+    if flight is not None:
+        found += [*coarse_grid(task, document), *_time(task, flight, document)]
+        found += _energy(task, model, flight, document)
+    return sorted([*found, *_grip(model, requirements, document)], key=lambda f: not f.certain)
 
 
 def moments(
@@ -198,12 +197,10 @@ def contradictions(
                 told.add((low.location, high.location))
                 yield _against_requirement(low, high, when, document)
     for requirement in requirements:
-        q = requirement.quantity
-        if (requirement.lower > q.upper or requirement.upper < q.lower) and (
-            requirement.location,
-            (),
-        ) not in told:
-            told.add((requirement.location, ()))
+        q, pair = requirement.quantity, (requirement.location, ())
+        outside = requirement.lower > q.upper or requirement.upper < q.lower
+        if outside and pair not in told:
+            told.add(pair)
             yield _against_range(requirement, q, document)
 
 
@@ -287,9 +284,9 @@ def _reason(gaps: Sequence[Gap], document: Document) -> str:
     return " with the other requirements kept" + (f", on the ground of {ground}" if ground else "")
 
 
-def coarse_grid(task: Task, flight: AskedFlight | None, document: Document) -> Iterator[Diagnostic]:
-    """Steps too long to time a push."""
-    if flight is None or task.step <= LONGEST:
+def coarse_grid(task: Task, document: Document) -> Iterator[Diagnostic]:
+    """Steps too long to time the push of a flight."""
+    if task.step <= LONGEST:
         return
     enough = int(-(-task.duration // LONGEST))
     sentence = (
@@ -305,20 +302,6 @@ FORWARD = 0.01  # m, way forward that needs friction of the ground: less is with
 
 
 STROKES = 3  # pushes in one motion, as none has more; a task that needs more energy is refused
-
-
-def budget_diagnostics(
-    task: Task,
-    model: Model,
-    requirements: Sequence[Requirement],
-    flight: AskedFlight | None,
-    document: Document,
-) -> Iterator[Diagnostic]:
-    """Time, energy, valves and friction of a task."""
-    if flight is not None:
-        yield from _time(task, flight, document)
-        yield from _energy(task, model, flight, document)
-    yield from _grip(model, requirements, document)
 
 
 def _time(task: Task, flight: AskedFlight, document: Document) -> Iterator[Diagnostic]:
@@ -392,9 +375,7 @@ def _grip(
         return
     way = max(last[0].lower - first[0].upper, first[0].lower - last[0].upper)
     floors = [e for e in model.effects if e.family == "ground" and "mu" in e.parameters()]
-    if not floors or all(float(e.value("mu")) > 0 for e in floors):
-        return
-    if way < FORWARD:
+    if way < FORWARD or all(float(e.value("mu")) > 0 for e in floors):
         return
     where = place(document, last[0].location)
     yield Diagnostic(

@@ -24,11 +24,8 @@ class Relax:
         """`goals.apex`: 1.45 m asked, 1.21 m is the most that can be reached."""
         end = "most" if self.asked > self.reachable else "least"
         asked, reachable = apart(self.asked, self.reachable, self.unit)
-        name = f"`{self.requirement}`"
-        if (
-            self.quantity not in (self.requirement.partition(".")[2], "")
-            and "*" not in self.requirement
-        ):
+        name, said = f"`{self.requirement}`", (self.requirement.partition(".")[2], "")
+        if self.quantity not in said and "*" not in self.requirement:
             name += f" ({self.quantity})"
         return f"{name}: {asked} asked, {reachable} is the {end} that can be reached"
 
@@ -78,15 +75,8 @@ def key(name: str, document: Document) -> str:
 
 def relax(document: Document, requirement: Requirement, asked: float, reachable: float) -> Relax:
     """How far a requirement must be relaxed."""
-    where = place(document, requirement.location)
-    return Relax(
-        requirement.text,
-        where,
-        requirement.quantity.name,
-        asked,
-        reachable,
-        requirement.quantity.unit,
-    )
+    where, quantity = place(document, requirement.location), requirement.quantity
+    return Relax(requirement.text, where, quantity.name, asked, reachable, quantity.unit)
 
 
 def one_per_requirement(relaxed: Iterable[Relax]) -> tuple[Relax, ...]:

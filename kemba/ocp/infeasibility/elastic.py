@@ -69,10 +69,8 @@ class Elastic(Transcription):
         `index` (nodes + 1, n): position of each node's variables in the full vector.
         """
         blocks = (
-            (self.yielding if requirement.location[0] in self.soft else self.hard)(
-                requirement, g, where, index
-            )
-            for requirement, g, where in self.requirement_expressions()
+            (self.yielding if asked[0].location[0] in self.soft else self.hard)(*asked, index)
+            for asked in self.requirement_expressions()
         )
         return [block for block in blocks if block is not None]
 
@@ -110,11 +108,8 @@ class Elastic(Transcription):
 
         `Y` (nodes + 1, n + slack): scaled variables.
         """
-        found = []
-        for requirement, column, scale in self.slack:
-            by = float(Y[0, column + 1] - Y[0, column])
-            found.append((requirement, by * scale, abs(by)))
-        return found
+        each = ((r, float(Y[0, k + 1] - Y[0, k]), scale) for r, k, scale in self.slack)
+        return [(requirement, by * scale, abs(by)) for requirement, by, scale in each]
 
 
 @dataclass(frozen=True)
@@ -138,10 +133,8 @@ def elastic(
     reduction: Reduction,
     session: Session,
 ) -> Outcome | None:
-    """Solve the task with soft requirements on a coarse grid; None when even that failed.
-
-    Raises Stopped when the user stopped it.
-    """
+    """Solve the task with soft requirements on a coarse grid; None when even that failed. Raises
+    Stopped when the user stopped it."""
     deadline = min(session.control.deadline, time.monotonic() + BUDGET)
     limited = replace(session, control=replace(session.control, deadline=deadline))
     sections = {str(w.location[0]) for w in requirements}

@@ -3,6 +3,7 @@ plan reaches, in words."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -49,12 +50,10 @@ def explanation(
     transcription, Y = outcome.transcription, outcome.point.Y
     trajectory = to_trajectory(transcription, Y)
     limits = active_limits(task, model, trajectory)
+    asked = ((r, by, r.upper if by > 0 else r.lower) for r, by, _ in outcome.given)
     given = one_per_requirement(
-        relax(
-            document, requirement, asked, 1.0 - asked if requirement.quantity.binary else asked + by
-        )
-        for requirement, by, _ in outcome.given
-        for asked in [requirement.upper if by > 0 else requirement.lower]
+        relax(document, r, end, 1.0 - end if r.quantity.binary else end + by)
+        for r, by, end in asked
     )
     if given:
         time = f" within {trajectory.time[-1]:.2f} s"
@@ -82,13 +81,8 @@ STEPS = 0.8  # part of the steps at a bound that is named
 
 def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
     """Parts of a sentence: `front and rear extension valves are open throughout the push`."""
-    return [
-        *_valves(model, trajectory),
-        *_torques(model, trajectory),
-        *_strokes(model, trajectory),
-        *_grip(model, trajectory),
-        *_steps(task, trajectory),
-    ]
+    of_robot = (part(model, trajectory) for part in (_valves, _torques, _strokes, _grip))
+    return [*chain.from_iterable(of_robot), *_steps(task, trajectory)]
 
 
 def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:
@@ -142,12 +136,9 @@ def _strokes(model: Model, trajectory: Trajectory) -> Iterator[str]:
     stance = np.flatnonzero(_stance(model, trajectory))
     if not len(stance):
         return
-    full = {
-        leg: bool(
-            trajectory[f"{leg}/piston/x"][: stance[-1] + 2].max() > FULL * model.mechanism.stroke
-        )
-        for leg in model.mechanism.legs
-    }
+    pushing, least = slice(stance[-1] + 2), FULL * model.mechanism.stroke
+    legs = model.mechanism.legs
+    full = {leg: bool(trajectory[f"{leg}/piston/x"][pushing].max() > least) for leg in legs}
     if any(full.values()):
         yield f"{_legs(model, full)} pistons use their whole stroke"
 

@@ -154,11 +154,7 @@ class Poses:
             if abs(slack[i]) < MET:
                 continue
             same = [w for w in requirements if w.quantity.name == name]
-            if slack[i] > 0:
-                requirement = min(same, key=lambda w: w.upper)
-                asked = requirement.upper
-            else:
-                requirement = max(same, key=lambda w: w.lower)
-                asked = requirement.lower
+            low, high = max(same, key=lambda w: w.lower), min(same, key=lambda w: w.upper)
+            requirement, asked = (high, high.upper) if slack[i] > 0 else (low, low.lower)
             gaps.append(Gap(requirement, asked, asked + float(slack[i])))
         return gaps

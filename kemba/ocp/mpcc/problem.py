@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError, suggest
+from kemba.ocp.functions.problem import derivative
 
 INF = np.inf
 BOUNDS = ("lbx", "ubx", "lbg", "ubg")
@@ -42,12 +43,14 @@ class SparseFunctions:
     @cached_property
     def grad_f(self) -> ca.Function:
         """(x, p) -> f and its gradient."""
-        return self._named("grad_f", [self.f, ca.gradient(self.f, self.x)], "f", "grad_f_x")
+        at, results = [self.x, self.parameter], [self.f, ca.gradient(self.f, self.x)]
+        return derivative("grad_f", at, results)
 
     @cached_property
     def jac_g(self) -> ca.Function:
         """(x, p) -> g and its Jacobian."""
-        return self._named("jac_g", [self.g, ca.jacobian(self.g, self.x)], "g", "jac_g_x")
+        at, results = [self.x, self.parameter], [self.g, ca.jacobian(self.g, self.x)]
+        return derivative("jac_g", at, results)
 
     @cached_property
     def hess_lag(self) -> ca.Function:
@@ -56,13 +59,7 @@ class SparseFunctions:
         lam_f, lam_g = kind.sym("lam_f"), kind.sym("lam_g", self.rows)
         lagrangian = lam_f * self.f + ca.dot(lam_g, self.g)
         hessian = ca.triu(ca.hessian(lagrangian, self.x)[0])
-        at = {"x": self.x, "p": self.parameter, "lam_f": lam_f, "lam_g": lam_g}
-        return ca.Function(
-            "hess_lag", list(at.values()), [hessian], list(at), ["triu_hess_gamma_x_x"]
-        )
-
-    def _named(self, name: str, results: list[Symbols], *names: str) -> ca.Function:
-        return ca.Function(name, [self.x, self.parameter], results, ["x", "p"], list(names))
+        return derivative("hess_lag", [self.x, self.parameter, lam_f, lam_g], [hessian])
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from kemba.ocp.phases.settings import ModeConstraints
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.transcription.first_node import state_rows
 from kemba.ocp.transcription.stage import aim_cost, as_variable, tighter_bounds
-from kemba.ocp.transcription.unilateral import Constraint, Friction
+from kemba.ocp.transcription.unilateral import Constraint
 
 AGREES = 1e-4  # of a scaled quantity; a dependent equality with another value contradicts the rest
 STEPS = 10  # of Gauss and Newton to a point on the equalities
@@ -193,21 +193,16 @@ def _friction(program: PhaseProgram, view: View, i: int, constraint: Constraint)
     forces: Where = [
         (p, np.concatenate([at[g] for g in own.split()])) for p, at in (*stages, *hits)
     ]
-    weight = program.model.mechanism.weight
+    weight, places = program.model.mechanism.weight, constraint.friction
+    tangential = program.model.node.lam[[places.forward, places.backward]]
     edges = (("forward", constraint.friction.cone_forward, BACK),
              ("backward", constraint.friction.cone_backward, AHEAD))  # fmt: skip
     for way, cone, sliding in edges:
-        most = ca.substitute(cone, _tangential(program, constraint.friction), ca.SX.zeros(2))
+        most = ca.substitute(cone, tangential, ca.SX.zeros(2))
         held = view.of(cone - (1.0 - program.task.grip) * most) / weight
         for wanted, g, high in ((HELD, held, INF), (sliding, view.of(cone) / weight, 0.0)):
             where = [(p, lam) for p, lam in forces if phases[p].modes[i] == wanted]
             program.mode_constraint(i, f"cone {way}", view.z(own), g, 0.0, high, where)
-
-
-def _tangential(program: PhaseProgram, friction: Friction) -> ca.SX:
-    """Both parts (2,) of a contact's friction among the forces of the node."""
-    lam = program.model.node.lam
-    return ca.vertcat(lam[friction.forward], lam[friction.backward])
 
 
 def _start(
@@ -315,10 +310,8 @@ def _between_moments(
         return
     before = ca.SX.sym("before", z.numel())
     g = later - ca.substitute(earlier, z, before)
-    names, full = "q v s u lam", True
-    if not (ca.depends_on(later, view.z("u lam")) or ca.depends_on(earlier, view.z("u lam"))):
-        names, full = "q v s", False
-    state = view.z(names).numel()
+    full = any(ca.depends_on(part, view.z("u lam")) for part in (later, earlier))
+    state = view.z("q v s u lam" if full else "q v s").numel()
     both = ca.vertcat(before[:state], z[:state])
     nodes = requirement.minus.node(program.nodes), requirement.node(program.nodes)
     at = np.concatenate([_columns(program, node, full) for node in nodes])
@@ -341,10 +334,9 @@ def _put(
     program: PhaseProgram, view: View, requirement: Requirement, g: ca.SX, nodes: list[int]
 ) -> None:
     variable = as_variable(g, view.z("q v s"))
-    columns = [_columns(program, node, full=variable is None) for node in nodes]
     if variable is not None:
         index, factor, offset = variable
-        at = [z[index] for z in columns]
+        at = [_columns(program, node, full=False)[index] for node in nodes]
         bounds = program.lower[at], program.upper[at]
         tighter = tighter_bounds(*bounds, factor, offset, requirement)
         if tighter is None:
@@ -353,20 +345,16 @@ def _put(
         return
     scale, label = requirement.scale, requirement.label
     low, high = requirement.lower / scale, requirement.upper / scale
-    if not ca.depends_on(g, view.z("u lam")):
-        columns = [_columns(program, node, full=False) for node in nodes]
-        program.add(label, view.z("q v s"), g / scale, low, high, columns)
-        return
-    program.add(label, view.z("q v s u lam"), g / scale, low, high, columns)
+    full = ca.depends_on(g, view.z("u lam"))
+    columns = [_columns(program, node, full) for node in nodes]
+    z = view.z("q v s u lam" if full else "q v s")
+    program.add(label, z, g / scale, low, high, columns)
 
 
 def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:
-    c = program.columns
-    at = c.end(node)
-    parts = [at["q"], at["v"], at["s"]]
-    if full and node > 0:
-        parts += [c.u[node - 1], at["lam"]]
-    return np.concatenate(parts)
+    at = program.columns.end(node)
+    acting = [program.columns.u[node - 1], at["lam"]] if full and node > 0 else []
+    return np.concatenate([*(at[g] for g in STATE), *acting])
 
 
 def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> list[ca.SX]:
@@ -386,17 +374,10 @@ def _granted_at_end(program: PhaseProgram, view: View, end: Independent) -> list
 
 def _states_of(program: PhaseProgram, expression: ca.SX) -> set[str]:
     """The coordinates, rates and states of effects on which an expression of the node depends."""
-    model, node = program.model, program.model.node
-    mechanism = model.mechanism
-    listed = [
-        (mechanism.coordinates, node.q),
-        (mechanism.velocities, node.v),
-        (model.states.values(), node.s),
-    ]
-    read = {str(symbol) for symbol in ca.symvar(expression)}
+    model, read = program.model, {str(symbol) for symbol in ca.symvar(expression)}
     return {
-        q.name
-        for quantities, symbols in listed
-        for q, symbol in zip(quantities, ca.vertsplit(symbols), strict=True)
-        if str(symbol) in read
+        quantity.name
+        for group in STATE
+        for i, quantity in enumerate(model.groups[group])
+        if str(getattr(model.node, group)[i]) in read
     }

@@ -94,16 +94,15 @@ def refine(
     task: Task,
     requirements: Sequence[Requirement],
     plan: Trajectory,
-    reduction: Reduction | None = None,
     control: Control | None = None,
     tell: Tell = silent,
 ) -> Refined:
     """The plan solved again with its modes kept and the durations of its phases free.
 
-    `reduction`: half or whole robot; by default the half where plan and task allow it. `tell` gets
-    the name of every solve.
+    It is solved by half the robot where plan and task allow it. `tell` gets the name of every
+    solve.
     """
-    reduction = reduction or reduction_of(model, task, requirements, plan)
+    reduction = reduction_of(model, task, requirements, plan)
     refiner = Refiner(model, task, requirements, plan, reduction, control or Control(), tell)
     try:
         return refiner.run()
@@ -281,10 +280,8 @@ class Refiner:
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The program of some phases and its start (size,), scaled.
-
-        Raises ValueError for a model to which the method does not apply.
-        """
+        """The program of some phases and its start (size,), scaled. Raises ValueError for a model
+        to which the method does not apply."""
         constraints = read_constraints(self.model, self.reduction)
         program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic

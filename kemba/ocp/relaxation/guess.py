@@ -127,10 +127,8 @@ def body_course(
     lands_at, bent = top + last - first, low + LANDING * (top - low) + last - first
     z0 = asked(requirements, "body/z", 0.0) or low
     z1 = asked(requirements, "body/z", 1.0)
-    peaks = [
-        w for w in requirements if w.quantity.name == "body/z" and w.at and np.isfinite(w.lower)
-    ]
-    peak = max(peaks, key=lambda w: w.lower, default=None)
+    heights = (w for w in requirements if w.quantity.name == "body/z" and w.at)
+    peak = max((w for w in heights if np.isfinite(w.lower)), key=lambda w: w.lower, default=None)
     feet = [w for w in requirements if w.quantity.name.endswith(("foot/z", "foot/gap"))]
     lands = any(w.at == 1.0 for w in feet)
     if z0 > top:
@@ -313,13 +311,9 @@ def _foot(
     if not runs:
         return hips - [0.0, reach[0] + FOLDED * (reach[1] - reach[0])]
     if task.periodic is not None:  # the strides before and after
-        stride = hips[-1, 0] - hips[0, 0]
-        last = task.duration
-        runs = [
-            (runs[-1][0] - last, runs[-1][1] - last),
-            *runs,
-            (runs[0][0] + last, runs[0][1] + last),
-        ]
+        stride, last = hips[-1, 0] - hips[0, 0], task.duration
+        (begin, end), (a, b) = runs[-1], runs[0]
+        runs = [(begin - last, end - last), *runs, (a + last, b + last)]
         places = [places[-1] - stride, *places, places[0] + stride]
     heights = task.scene.skyline(np.array(places))
     x, z = np.full_like(t, places[0]), np.full_like(t, heights[0])
@@ -386,14 +380,8 @@ def automatic_guess(
         q[:, names.index(f"{leg}/hip/q")] = hip
         q[:, names.index(f"{leg}/knee/q")] = place.fold * bend
         forces[leg] = course.load[leg] * _lever(robot, bend)
-    v = np.asarray(np.gradient(q, t, axis=0))
-    groups: dict[str, np.ndarray] = {
-        "q": q,
-        "v": v,
-        "h": np.full((nodes + 1, 1), task.duration / nodes),
-    }
-    groups |= _efforts(model, t, forces, course.load)
-    Y = layout.pack(groups)
+    v, h = np.asarray(np.gradient(q, t, axis=0)), np.full((nodes + 1, 1), task.duration / nodes)
+    Y = layout.pack({"q": q, "v": v, "h": h, **_efforts(model, t, forces, course.load)})
     if task.guess_noise:
         rng = np.random.default_rng(task.seed)
         Y = Y + task.guess_noise * rng.normal(size=Y.shape)

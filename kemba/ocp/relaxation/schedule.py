@@ -52,20 +52,13 @@ def find(schedule: Schedule, start: Iterate) -> Iterate:
 def binary(schedule: Schedule, point: Iterate, push: float = WARM_PUSH) -> Iterate:
     """Push the valves towards 0 and 1, then round and fix them, the pairs as loose as before; the
     start moves `push` off the bounds."""
-    tol = Ends.tol
-    parameters = valve_parameters()
+    tol, weights = Ends.tol, (Relaxation.loose, Relaxation.valve, Relaxation.switching)
+    parameters = Parameters(*weights, forces=Relaxation.forces)
     options = warm(Starts.changed_mu, push, tol=tol)
     point = schedule.solve("binary valves", point, parameters, options=options)
     options, fixed = warm(Starts.rounded_mu, Starts.rounded, tol=tol), schedule.valves(point)
     parameters = Parameters(Relaxation.loose, forces=Relaxation.forces)
     return schedule.solve("round valves", point, parameters, options=options, fixed=fixed)
-
-
-def valve_parameters() -> Parameters:
-    """Loose pairs and a cost that pushes valves towards 0 and 1."""
-    return Parameters(
-        Relaxation.loose, Relaxation.valve, Relaxation.switching, forces=Relaxation.forces
-    )
 
 
 def fix(
@@ -99,9 +92,8 @@ def move(schedule: Schedule, start: Iterate, eps: float | None = None, **more: A
     eps = Relaxation.tight if eps is None else eps
     options = {**warm(Starts.changed_mu, Starts.changed, tol=Ends.tol), **more}
     free = _released(schedule.valves(start))
-    parameters = Parameters(
-        eps, Relaxation.valve, Relaxation.switching_moved, forces=Relaxation.forces
-    )
+    weights = Relaxation.valve, Relaxation.switching_moved
+    parameters = Parameters(eps, *weights, forces=Relaxation.forces)
     return schedule.solve("move switches", Iterate(start.Y), parameters, options=options, free=free)
 
 
@@ -213,10 +205,8 @@ HELD = ("u", "lam", "h")  # act on the interval before a node
 
 
 def resumed(transcription: Transcription, trajectory: Trajectory) -> Iterate:
-    """The trajectory as a point of the program; another number of nodes is interpolated.
-
-    Raises KembaError when the trajectory lacks a column of the model.
-    """
+    """The trajectory as a point of the program; another number of nodes is interpolated. Raises
+    KembaError when the trajectory lacks a column of the model."""
     t = transcription
     groups = node_groups(t.model, trajectory)
     at = np.linspace(0.0, len(trajectory) - 1, t.nodes + 1)

@@ -82,15 +82,9 @@ class Schedule:
         to bounds that hold as well. Raises Stopped when it was cut short."""
         self.tell(name)
         t = self.transcription
-        point = self.ipopt.solve(
-            start,
-            parameters.vector(t.nodes),
-            options,
-            _bounds(t, fixed or {}, free or {}),
-            parameters.proximal,
-            stagnation,
-            regularised=_regularised(t, parameters),
-        )
+        p, weight = parameters.vector(t.nodes), parameters.proximal
+        bounds, regular = _bounds(t, fixed or {}, free or {}), _regularised(t, parameters)
+        point = self.ipopt.solve(start, p, options, bounds, weight, stagnation, regular)
         assert point.ending is not None
         self.attempts.append(Attempt(name, point.ending, point.iterations))
         if point.ending.cut_short:

@@ -26,11 +26,7 @@ def duration(model: Model, u: ca.SX, h: ca.SX) -> ca.SX:
     return h
 
 
-COSTS: dict[str, Cost] = {
-    "torque_squared": torque_squared,
-    "air": air,
-    "duration": duration,
-}
+COSTS: dict[str, Cost] = {"torque_squared": torque_squared, "air": air, "duration": duration}
 
 
 def running(
@@ -44,9 +40,8 @@ def running(
     for name, term in cost.items():
         if isinstance(term, CostTerm):
             value = quantity_expression(model, term.expression)
-            node = model.node
-            symbols = [node.q, node.v, node.s, node.u, node.lam]
-            here = [ca.densify(now[group]) for group in ("q", "v", "s", "u", "lam")]
+            symbols = [getattr(model.node, group) for group in model.groups]
+            here = [ca.densify(now[group]) for group in model.groups]
             total += term.weight * h * ca.substitute([ca.SX(value)], symbols, here)[0]
         else:
             total += term * COSTS[name](model, now["u"], h)

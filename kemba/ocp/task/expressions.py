@@ -33,10 +33,8 @@ class Difference:
 
 
 def two_moments(text: str) -> Difference | None:
-    """The two parts of a difference between moments; None where the text has no `at(...)`.
-
-    Raises ValueError where `at(...)` stands in any other form.
-    """
+    """The two parts of a difference between moments; None where the text has no `at(...)`. Raises
+    ValueError where `at(...)` stands in any other form."""
     if not re.search(r"\bat\(", text):
         return None
     match = TWO_MOMENTS.fullmatch(text)
@@ -47,10 +45,8 @@ def two_moments(text: str) -> Difference | None:
 
 
 def expressed(text: str, known: Mapping[str, Quantity]) -> Quantity:
-    """The quantity of an expression: its text as name, its unit, its size.
-
-    Raises KembaError for an unknown name, ValueError for what is no expression or mixes units.
-    """
+    """The quantity of an expression: its text as name, its unit, its size. Raises KembaError for an
+    unknown name, ValueError for what is no expression or mixes units."""
     tree, names = _parsed(text)
     for name in names.values():
         if name not in known:

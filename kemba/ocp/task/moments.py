@@ -36,10 +36,8 @@ def share_of(moment: Moment, task: Task) -> float:
 
 
 def spans(contacts: Sequence[Stance]) -> list[tuple[float, float]]:
-    """The share of the nodes at which each part of the contacts begins and ends.
-
-    Raises ValueError where the shares add up to more than the motion, or to less.
-    """
+    """The share of the nodes at which each part of the contacts begins and ends. Raises ValueError
+    where the shares add up to more than the motion, or to less."""
     if not contacts:
         return []
     given = sum(part.share or 0.0 for part in contacts)

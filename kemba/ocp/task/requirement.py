@@ -105,11 +105,9 @@ class Requirement:
 def quantities(model: Model) -> dict[str, Quantity]:
     """Every quantity that a task may name: coordinates, rates, ports, states, inputs, forces."""
     mechanism = model.mechanism
-    own = [*mechanism.coordinates, *mechanism.velocities]
     ports = [q for p in mechanism.ports.values() for q in (p.quantity, p.rate)]
-    groups = (model.states, model.inputs, model.forces)
-    named = [q for group in groups for q in group.values()]
-    known = {q.name: q for q in (*ports, *own, *named)}
+    named = [quantity for group in model.groups.values() for quantity in group]
+    known = {q.name: q for q in (*ports, *named)}
     points = [f"{leg}/{point}" for leg in mechanism.legs for point in POINTS]
     # heights above the ground, where these are heights above 0
     return {**{f"{p}/gap": known[f"{p}/z"] for p in points if f"{p}/z" in known}, **known}
@@ -119,29 +117,19 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
     """A quantity, or an expression of them, of the node's q, v, s, lam, u."""
     if is_expression(name):
         return symbolic(name, lambda part: quantity_expression(model, part))
-    node, mechanism = model.node, model.mechanism
-    groups = [
-        (mechanism.coordinates, node.q),
-        (mechanism.velocities, node.v),
-        (model.states.values(), node.s),
-        (model.forces.values(), node.lam),
-        (model.inputs.values(), node.u),
-    ]
-    for group, symbol in groups:
-        for i, quantity in enumerate(group):
+    for group, quantities in model.groups.items():
+        for i, quantity in enumerate(quantities):
             if quantity.name == name:
-                return symbol[i]
+                return ca.SX(getattr(model.node, group)[i])
     level = f"{name.removesuffix('gap')}z"  # on level ground at 0 gaps are heights
-    return node.outputs[name if name in node.outputs else level]
+    outputs = model.node.outputs
+    return outputs[name if name in outputs else level]
 
 
 def highest(requirements: Sequence[Requirement]) -> Requirement | None:
     """The goal, or without one the end, that asks for the greatest height of the body, or None."""
-    high = [
-        w
-        for w in requirements
-        if w.quantity.name == "body/z" and w.at and w.lower > -math.inf and w.minus is None
-    ]
+    heights = (w for w in requirements if w.quantity.name == "body/z" and w.minus is None)
+    high = [w for w in heights if w.at and w.lower > -math.inf]
     goals = [w for w in high if w.location[0] == "goals"]
     return max(goals or high, key=lambda w: w.lower, default=None)
 

@@ -43,10 +43,8 @@ class NotGivenError(ValueError):
 def resolve(
     task: Task, model: Model, document: Document, partial: bool = False
 ) -> list[Requirement]:
-    """All requirements of a task. `partial`: nothing is said of what the task does not give.
-
-    Raises ConfigErrors with every wrong name, unit or range, of its costs and solver options too.
-    """
+    """All requirements of a task. `partial`: nothing is said of what the task does not give. Raises
+    ConfigErrors with every wrong name, unit or range, of its costs and solver options too."""
     known, task = quantities(model), with_height(task, model)
     requirements: list[Requirement] = []
     errors: list[KembaError] = []
@@ -101,10 +99,9 @@ def resolve(
 def _loose(requirement: Requirement, states: AbstractSet[str]) -> float:
     """How far a plan on nodes may miss a force of air that is asked for under way: it depends on
     when valves switch, to less than a step."""
-    fixed = requirement.lower == requirement.upper and requirement.at not in (None, 0.0)
-    return (
-        AIR * requirement.quantity.scale if fixed and requirement.quantity.name in states else 0.0
-    )
+    quantity, later = requirement.quantity, requirement.at not in (None, 0.0)
+    fixed = later and requirement.lower == requirement.upper
+    return AIR * quantity.scale if fixed and quantity.name in states else 0.0
 
 
 def _cost_errors(

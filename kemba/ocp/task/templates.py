@@ -61,28 +61,22 @@ def _clear_swings(task: Task, model: Model) -> list[Requirement]:
     assert task.clearance is not None
     known, found = quantities(model), []
     for leg in model.mechanism.legs:
-        parts = [
-            (leg in part.on, *span)
-            for part, span in zip(task.contacts, spans(task.contacts), strict=True)
-        ]
-        for stands, run in itertools.groupby(parts, operator.itemgetter(0)):
-            own = list(run)
-            begin, end = own[0][1], own[-1][2]
-            if not stands:
-                middle, half = (begin + end) / 2, FLIGHT * (end - begin) / 2
-                during = middle - half, middle + half
-                gap = known[f"{leg}/foot/gap"]
-                found.append(
-                    Requirement(("clearance",), gap, None, task.clearance, math.inf, during)
-                )
+        gap, stands = known[f"{leg}/foot/gap"], [leg in part.on for part in task.contacts]
+        parts = zip(stands, spans(task.contacts), strict=True)
+        for on, run in itertools.groupby(parts, operator.itemgetter(0)):
+            own = [span for _, span in run]
+            begin, end = own[0][0], own[-1][1]
+            middle, half = (begin + end) / 2, FLIGHT * (end - begin) / 2
+            during = middle - half, middle + half
+            if not on:
+                asked = Requirement(("clearance",), gap, None, task.clearance, math.inf, during)
+                found.append(asked)
     return found
 
 
 def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
     """Every foot as high above the ground as the task's `feet`, at the highest goal of the body.
-
-    Raises ValueError where there is no such goal.
-    """
+    Raises ValueError where there is no such goal."""
     apex = highest(others)
     if task.feet is None:
         return []
@@ -96,10 +90,8 @@ def feet_at_apex(task: Task, model: Model, others: Sequence[Requirement]) -> lis
 
 
 def standing_feet(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
-    """The feet of every part of `contacts` on the ground, the others without force.
-
-    Raises ValueError where a part names a leg that there is not, or shares do not add up.
-    """
+    """The feet of every part of `contacts` on the ground, the others without force. Raises
+    ValueError where a part names a leg that there is not, or shares do not add up."""
     if not task.contacts:
         return []
     legs, known, found = model.mechanism.legs, quantities(model), []
@@ -115,10 +107,8 @@ def standing_feet(task: Task, model: Model, others: Sequence[Requirement]) -> li
 
 
 def closed_in_itself(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
-    """Every coordinate, rate, force of air and valve at the end as at the start.
-
-    Raises ValueError where `except` names what there is not.
-    """
+    """Every coordinate, rate, force of air and valve at the end as at the start. Raises ValueError
+    where `except` names what there is not."""
     if task.periodic is None:
         return []
     excepted = task.periodic.excepted

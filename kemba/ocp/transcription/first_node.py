@@ -63,10 +63,8 @@ def _row(kind: str, row: Row, scale: float, g: ca.SX) -> StateRow:
 
 
 def _of_the_state(node: Node, g: ca.SX) -> bool:
-    others = ca.vertcat(node.a, node.sd, node.lam, node.u)
-    return bool(ca.depends_on(g, ca.vertcat(node.q, node.v, node.s))) and not ca.depends_on(
-        g, others
-    )
+    state, others = ca.vertcat(node.q, node.v, node.s), [node.a, node.sd, node.lam, node.u]
+    return bool(ca.depends_on(g, state) and not ca.depends_on(g, ca.vertcat(*others)))
 
 
 def granted(g: ca.SX, y: ca.SX, layout: Layout, held: Sequence[Held]) -> bool:

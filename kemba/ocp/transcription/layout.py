@@ -1,6 +1,6 @@
 """What a node's vector holds: q, v, s, u, lam, h, scaled, possibly of half a robot."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
@@ -25,24 +25,16 @@ class Layout:
     def __init__(self, model: Model, reduction: Reduction, step: float, variation: float) -> None:
         mechanism = model.mechanism
         h = Quantity("step", "s", step * (1 - variation), step * (1 + variation), STEP)
-        full: dict[str, Iterable[Quantity]] = {
-            "q": mechanism.coordinates,
-            "v": mechanism.velocities,
-            "s": model.states.values(),
-            "u": model.inputs.values(),
-            "lam": model.forces.values(),
-            "h": (h,),
-        }
+        full = {**model.groups, "h": (h,)}
         self.reduction = reduction
-        self.quantities = {g: self._kept(g, list(full[g])) for g in GROUPS}
+        self.quantities = {g: self._kept(g, full[g]) for g in GROUPS}
         self.slices: dict[str, slice] = {}
-        start = 0
+        listed: list[Quantity] = []
         for group in GROUPS:
-            stop = start + len(self.quantities[group])
-            self.slices[group] = slice(start, stop)
-            start = stop
-        listed = [q for group in GROUPS for q in self.quantities[group]]
-        self.size = start
+            start = len(listed)
+            listed += self.quantities[group]
+            self.slices[group] = slice(start, len(listed))
+        self.size = len(listed)
         self.scale = np.array([q.scale for q in listed])
         self.origin = np.array(mechanism.origin)
         zero = np.zeros(self.size)
@@ -57,7 +49,7 @@ class Layout:
             return np.eye(1)
         return self.reduction.B["q" if group == "v" else group]
 
-    def _kept(self, group: str, full: list[Quantity]) -> list[Quantity]:
+    def _kept(self, group: str, full: Sequence[Quantity]) -> list[Quantity]:
         matrix = self._matrix(group)
         return [full[int(np.argmax(np.abs(matrix[:, j])))] for j in range(matrix.shape[1])]
 

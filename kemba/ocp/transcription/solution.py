@@ -4,7 +4,6 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.ocp.transcription.transcribe import Transcription
-from kemba.quantity import Quantity
 from kemba.trajectory import Trajectory
 
 
@@ -37,21 +36,10 @@ def written(
     measured = np.array(node.measure.map(len(time))(*(values.T for values in at), [])).T
     for quantity, values in zip(node.output_quantities, measured.T, strict=True):
         columns[quantity.header] = values
-    for name, group in groups(model).items():
+    for name, group in model.groups.items():
         columns |= {q.header: values for q, values in zip(group, x[name].T, strict=True)}
     meta = {"kind": "plan", "run": run, **model.mechanism.scene.dump()}
     return Trajectory(time, columns, meta)
-
-
-def groups(model: Model) -> dict[str, list[Quantity]]:
-    """The quantities of q, v, s, u and lam."""
-    return {
-        "q": list(model.mechanism.coordinates),
-        "v": list(model.mechanism.velocities),
-        "s": list(model.states.values()),
-        "u": list(model.inputs.values()),
-        "lam": list(model.forces.values()),
-    }
 
 
 def arrays(model: Model, trajectory: Trajectory) -> dict[str, np.ndarray]:
@@ -59,5 +47,5 @@ def arrays(model: Model, trajectory: Trajectory) -> dict[str, np.ndarray]:
     rows = len(trajectory)
     return {
         name: np.column_stack([trajectory[q.name] for q in group]) if group else np.zeros((rows, 0))
-        for name, group in groups(model).items()
+        for name, group in model.groups.items()
     }

@@ -68,18 +68,9 @@ def build_stage(
     node, h = model.node, layout.half(y, "h")
     now = {group: layout.full(y, group) for group in ("q", "v", "s", "u", "lam")}
     v0, s0 = layout.full(y0, "v"), layout.full(y0, "s")
-    dynamics, rate, pair_a, pair_b, limits = node.residual.call(
-        [
-            now["q"],
-            now["v"],
-            (now["v"] - v0) / h,
-            now["s"],
-            (now["s"] - s0) / h,
-            now["lam"],
-            now["u"],
-            ca.SX(0, 1),
-        ]
-    )
+    at = [now["q"], now["v"], (now["v"] - v0) / h, now["s"], (now["s"] - s0) / h]
+    parts = node.residual.call([*at, now["lam"], now["u"], ca.SX(0, 1)])
+    dynamics, rate, pair_a, pair_b, limits = parts
     eps, weights = ca.SX.sym("eps"), ca.SX.sym("weights", 4)
     a_rows = [node.pair_rows[i][0] for i in reduction.pairs]
     b_rows = [node.pair_rows[i][1] for i in reduction.pairs]
@@ -168,15 +159,8 @@ def _signs(
 ) -> StageRows:
     """Rows g >= 0, except where g is a variable whose own bound says so."""
     kept = [i for i in range(g.numel()) if not bounded_below(g[i], y, layout)]
-    return _rows(
-        "sign",
-        g[kept],
-        [rows[i].label for i in kept],
-        [rows[i].unit for i in kept],
-        0.0,
-        INF,
-        [scales[i] for i in kept],
-    )
+    labels, units = [rows[i].label for i in kept], [rows[i].unit for i in kept]
+    return _rows("sign", g[kept], labels, units, 0.0, INF, [scales[i] for i in kept])
 
 
 def aim_cost(requirement: Requirement, g: ca.SX) -> ca.SX:

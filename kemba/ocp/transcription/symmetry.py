@@ -111,13 +111,8 @@ def find_symmetry(model: Model) -> Reduction | None:
 def image_matrices(model: Model) -> dict[str, Matrix]:
     """The mirror as signed permutations of q, s, lam and u; the model must have one."""
     names = mirror_names(model)
-    groups = {
-        "q": [c.name for c in model.mechanism.coordinates],
-        "s": [q.name for q in model.states.values()],
-        "lam": [q.name for q in model.forces.values()],
-        "u": [q.name for q in model.inputs.values()],
-    }
-    return {name: _image_matrix(columns, names) for name, columns in groups.items()}
+    columns = {group: [q.name for q in model.groups[group]] for group in ("q", "s", "lam", "u")}
+    return {group: _image_matrix(own, names) for group, own in columns.items()}
 
 
 def _image_matrix(columns: list[str], names: Mapping[str, str]) -> Matrix:
@@ -148,20 +143,16 @@ def _residual_is_symmetric(model: Model, images: Mapping[str, Matrix]) -> bool:
         s = draw["s"] * [x.scale for x in model.states.values()]
         sd = draw["s"][::-1].copy()
         lam, u = draw["lam"] * 50.0, draw["u"]
-        here = residual(q, v, a, s, sd, lam, u, [])
-        m = images
+        m, point = images, (q, v, a, s, sd, lam, u)
         motion = (_mirrored(model, m, q), m["q"] @ v, m["q"] @ a)
-        there = residual(*motion, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u, [])
-        dynamics = np.allclose(m["q"] @ np.array(here[0]).ravel(), np.array(there[0]).ravel())
-        rates = np.allclose(m["s"] @ np.array(here[1]).ravel(), np.array(there[1]).ravel())
-        pairs = np.allclose(
-            np.sort((np.array(here[2]) * np.array(here[3])).ravel()),
-            np.sort((np.array(there[2]) * np.array(there[3])).ravel()),
+        image = (*motion, m["s"] @ s, m["s"] @ sd, m["lam"] @ lam, m["u"] @ u)
+        here, there = (
+            [np.array(part).ravel() for part in residual(*at, [])] for at in (point, image)
         )
-        limits = np.allclose(
-            np.sort(np.array(here[4]).ravel()), np.sort(np.array(there[4]).ravel())
-        )
-        if not (dynamics and rates and pairs and limits):
+        same = [(m["q"] @ here[0], there[0]), (m["s"] @ here[1], there[1])]
+        same.append((np.sort(here[2] * here[3]), np.sort(there[2] * there[3])))  # of pairs
+        same.append((np.sort(here[4]), np.sort(there[4])))  # of limits
+        if not all(np.allclose(*pair) for pair in same):
             return False
     return True
 

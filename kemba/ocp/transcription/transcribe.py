@@ -141,10 +141,7 @@ class Transcription:
 
         `index` (nodes + 1, n): position of each node's variables in the full vector.
         """
-        blocks = (
-            self.hard(requirement, g, where, index)
-            for requirement, g, where in self.requirement_expressions()
-        )
+        blocks = (self.hard(*asked, index) for asked in self.requirement_expressions())
         return [block for block in blocks if block is not None]
 
     def hard(
@@ -173,10 +170,9 @@ class Transcription:
         """
         z, at = self.stage.y, index[where, : self.layout.size]
         if requirement.minus is not None:
-            before = np.tile(
-                index[requirement.minus.node(self.nodes), : self.layout.size], (len(where), 1)
-            )
-            z, at = ca.vertcat(self.stage.y0, z), np.hstack([before, at])
+            earlier = index[requirement.minus.node(self.nodes), : self.layout.size]
+            z = ca.vertcat(self.stage.y0, z)
+            at = np.hstack([np.tile(earlier, (len(where), 1)), at])
         return z, g, ca.SX(0), at
 
     def _first_node_blocks(self, index: np.ndarray) -> list[RequirementBlock]:
@@ -238,24 +234,16 @@ class Transcription:
         Those that the symmetry grants or repeats are left out.
         """
         seen: set[tuple[object, ...]] = set()
-        for requirement in self.requirements:
-            g = self.of_state(quantity_expression(self.model, requirement.quantity.name))
-            if requirement.minus is not None:
-                earlier = self.of_state(quantity_expression(self.model, requirement.minus.name))
+        for r in self.requirements:
+            g = self.of_state(quantity_expression(self.model, r.quantity.name))
+            if r.minus is not None:
+                earlier = self.of_state(quantity_expression(self.model, r.minus.name))
                 g = g - ca.substitute(earlier, self.stage.y, self.stage.y0)
-            key = (
-                requirement.location,
-                requirement.at,
-                requirement.minus,
-                requirement.during,
-                str(g),
-                requirement.lower,
-                requirement.upper,
-            )
+            key = r.location, r.at, r.minus, r.during, str(g), r.lower, r.upper
             if ca.jacobian(g, self.stage.y).nnz() == 0 or key in seen:
                 continue
             seen.add(key)
-            yield requirement.on_nodes, g, requirement.nodes(self.nodes)
+            yield r.on_nodes, g, r.nodes(self.nodes)
 
     def _tighten(
         self, where: list[int], variable: tuple[int, float, float], requirement: Requirement

@@ -34,10 +34,8 @@ class Constraint:
 
 
 def read_constraints(model: Model, reduction: Reduction) -> list[Constraint]:
-    """The constraints of a model that its half (or whole) problem keeps.
-
-    Raises ValueError where a pair is neither a gap with a force nor the friction of one.
-    """
+    """The constraints of a model that its half (or whole) problem keeps. Raises ValueError where a
+    pair is neither a gap with a force nor the friction of one."""
     found = rigid_constraints(model, reduction)
     covered = sum(4 if c.friction else 1 for c in found)
     if covered != len(reduction.pairs):
@@ -83,10 +81,8 @@ def _friction(node: Node, rows: dict[str, int], owner: str) -> Friction | None:
 
 
 def _place(node: Node, expression: ca.SX) -> int | None:
-    for i in range(node.lam.numel()):
-        if ca.is_equal(expression, node.lam[i]):
-            return i
-    return None
+    places = range(node.lam.numel())
+    return next((i for i in places if ca.is_equal(expression, node.lam[i])), None)
 
 
 def _is_gap(node: Node, expression: ca.SX) -> bool:

@@ -163,9 +163,7 @@ SWAPS = 6  # changes of the active set before Lemke's method takes over
 @kernel
 def solve_lcp(w: Lcp, n: int) -> None:
     """Solution z and active set of the first n unknowns, starting from the active set `w.on`.
-
-    Raises NoSolutionError.
-    """
+    Raises NoSolutionError."""
     for attempt in range(2):
         if attempt == 1:
             for i in range(n):
