@@ -26,8 +26,8 @@ class Balance:
         self.model, self.names = model, (*free, *scaled)
         node = model.build(free, scaled)
         self.inputs = [q.name for q in model.inputs.values()]
-        drive = model.mechanism.rig == "drive"
-        force = node.dynamics[0] + node.u[0] if drive else node.outputs["piston/F"]
+        self._drive = model.mechanism.rig == "drive"
+        force = node.dynamics[0] + node.u[0] if self._drive else node.outputs["piston/F"]
         symbols = [node.s, node.q, node.v, node.a, node.u, node.p]
         slopes = ca.horzcat(ca.jacobian(force, node.a), ca.jacobian(force, node.u))
         self._slopes = ca.Function("slopes", symbols, [ca.densify(slopes.T)])
@@ -44,13 +44,16 @@ class Balance:
 
         The measured force is behind a filter. What bends with the motion is not the same behind the
         filter as of a motion that is behind it: it is told of what was read, and filtered itself.
+        Of a cylinder, whose seals stretch at a turn, turns are in doubt as far as the filter mixes.
         """
         s, q, v, a, u, p = self._arguments(log, values)
 
         def part(name: str, q: Array, v: Array) -> Array:
             return np.asarray(self._parts[name](s, q, v, a, u, p)).ravel()
 
-        straight, bent = part("standing", q, v), part("moving", q, log.quick[None])
+        straight, bent = part("standing", q, v), part("moving", q, self._rate(log)[None])
+        if not self._drive:
+            straight, bent = straight + bent, np.zeros_like(bent)
         if self._bends:
             straight -= part("static", q, v)
             bent += part("static", log.read[None], v)
@@ -68,14 +71,18 @@ class Balance:
         s, n = self._along(log, u, p[:, 0]), len(log.q)
         return [s, *(c[None] for c in (log.q, log.v, log.a)), u, np.repeat(p, n, axis=1)]
 
+    def _rate(self, log: Filtered) -> Array:
+        """The rate (n,) of which friction is told."""
+        return log.quick if self._drive else log.v
+
     def _along(self, log: Filtered, u: Array, p: Array) -> Array:
         """States (ns, n) along the whole log; each stretch begins at rest."""
         if self._states is None:
             return np.zeros((0, len(log.time)))
-        parts = []
+        parts, rate = [], self._rate(log)
         for begin, end in zip(log.begins, np.append(log.begins[1:], len(log.time)), strict=True):
             own = slice(begin, end)
-            middle = [0.5 * (c[own][1:] + c[own][:-1]) for c in (log.q, log.quick, log.a, *u)]
+            middle = [0.5 * (c[own][1:] + c[own][:-1]) for c in (log.q, rate, log.a, *u)]
             start = self._states.rest(log.q[begin], 0.0, 0.0, u[:, begin], p)
             parts.append(self._states.run(start, np.stack([np.diff(log.time[own]), *middle]), p))
         return np.concatenate(parts, axis=1)
