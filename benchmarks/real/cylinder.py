@@ -42,10 +42,6 @@ NOTES = (
     "Size of a usual friction (`SEAL`): it was halved, to 5 N at 25 mm, after a "
     "first look at these data. With 10 N the constant part of the O-ring was found as well, but "
     "left out as too small to matter.",
-    "Intervals of the O-ring by `discover` miss what was read off by hand, and those of "
-    "`characterise` hold it: with both laws a little of the constant part passes for growth. "
-    "`discover` leaves nominal figures and all other effects free within their tolerances, "
-    "`characterise` does not.",
     "Friction within 0.5 mm after a turn is taken to be in doubt, as seals stretch. Without that "
     "the answers named delays of sensors of 10 to 25 ms.",
 )

@@ -26,10 +26,9 @@ def section(scratch: Path, download: bool) -> list[str]:
 
 
 NOTES = (
-    "`presliding` is Coulomb friction that needs some travel to turn round; its force is to be "
-    "compared with the published F_c.",
-    "`sensor_delay:axis/q` is the clock of the position beside that of the force: the force acts "
-    "1.2 ms after the row that names it.",
+    "`presliding` is Coulomb friction that needs some travel to turn round; what it and "
+    "`axis_friction` give together is to be compared with the published F_c.",
+    "`sensor_delay:axis/q` is the clock of the position beside that of the force.",
     "Without the rule that an effect must explain a tenth of what the answer leaves, the friction "
     "was split between two laws of it (14 and 8 N), with a lag of 2 ms beside them. The rule was "
     "made for these data.",

@@ -72,7 +72,7 @@ The last one was checked on drives that were simulated. With coloured noise alon
 intervals hold the truth, before and after. With cogging that every repeat of the motion repeats, 8
 of 32 did with blocks of time alone, and 32 do now.
 
-Next: [own rigs](logs.md#rigs-of-your-own), or [how `discover` works](discovery.md).
+Next: [own rigs](../../docs/logs.md), or [how `discover` works](../../docs/discovery.md).
 """
 
 
