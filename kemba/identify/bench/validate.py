@@ -59,12 +59,10 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
     if lagging := _clock(run, predict):
         return lagging
     if as_read[()] > NOTHING:
-        what, left = (
-            "piston/F does not follow the valves at all",
-            f"{as_read[()]:.1f} of its spread",
-        )
+        what = "piston/F does not follow the valves at all"
+        left = f"the model leaves {as_read[()]:.1f} of its spread"
         hint = "are columns swapped, or the logs of another test?"
-        return [KembaError(run.name, what, f"the model leaves {left}", hint)]
+        return [KembaError(run.name, what, left, hint)]
     return []
 
 

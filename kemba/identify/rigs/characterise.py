@@ -99,9 +99,8 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]
     problem: Problem = make(logs, started, dict.fromkeys(names, LOOSE))
-    seen = (
-        np.linalg.norm(problem.jacobian({}, names), axis=0) > 1.0
-    )  # 1 sigma below the value itself
+    # a slope of 1: a shape is known to its own size at 1 sigma
+    seen = np.linalg.norm(problem.jacobian({}, names), axis=0) > 1.0
     shapes = {
         f"{e.name}.{n}" for e in started.effects if e.off for n in e.parameters().keys() - e.off
     }

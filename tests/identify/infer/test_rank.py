@@ -289,3 +289,13 @@ def test_a_sentence_names_many_effects_and_leaves_tables_to_the_ranking() -> Non
     found = Answer("missing", ranking=ranking, sure=("payload", "tubes", "rope"))
     named = f"payload (m = {mass}), tubes (3 parameters) and rope (m = {mass})"
     assert phrase(found).startswith(f"Missing: {named}; ")
+
+
+@pytest.mark.parametrize(("before", "verdict"), [(1.2, "nothing"), (2.5, "unknown")])
+def test_what_would_raise_the_quoted_error_is_not_written(before: float, verdict: str) -> None:
+    """Of a model that explains the logs as it is, nothing is missing then."""
+    found = Answer("missing", added=("payload",), error_before=before, error_after=3.0)
+    found.drop_model()
+    assert (found.verdict, found.writes, found.error_after) == (verdict, False, before)
+    assert found.remarks[0] == f"payload would raise the quoted error from {before:.2f} to 3.00: " \
+        "no model is written"  # fmt: skip
