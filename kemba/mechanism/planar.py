@@ -80,7 +80,8 @@ class Mechanism:
         coordinates are counted by whoever scales them, and about there it has its mirror.
 
         Unless that is level at 0 and free, it has ports for the height of feet, knees and hips
-        above the ground under them (`front/foot/gap`), and above its obstacles (`front/foot/room`).
+        above the ground under them (`front/foot/gap`), for their distance from its obstacles
+        (`front/foot/room`), and from each part of ground with walls (`front/foot/distance`).
         It has a mirror where every place of the scene is like every other. Raises ValueError where
         it stands in a scene already.
         """
@@ -163,13 +164,18 @@ class Mechanism:
 def _scene_ports(mechanism: Mechanism, scene: Scene) -> dict[str, Port]:
     found: dict[str, Port] = {}
 
-    def add(name: str, height: ca.SX, doc: str) -> None:
+    def add(name: str, length: ca.SX, doc: str) -> None:
         rate = Quantity(f"{name}_rate", "m.s-1")
-        found[name] = Port(Quantity(name, "m", doc=f"height above {doc}"), rate, height)
+        found[name] = Port(Quantity(name, "m", doc=doc), rate, length)
 
+    stretches = scene.ground.stretches
     for place in (f"{leg}/{p}" for leg in mechanism.legs if not scene.plain for p in POINTS):
         x, z = (mechanism.ports[f"{place}/{axis}"].phi for axis in "xz")
-        add(f"{place}/gap", z - scene.ground.height(x), "the ground under it")
+        add(f"{place}/gap", z - scene.ground.height(x), "height above the ground under it")
+        for i, solid in enumerate(stretches if len(stretches) > 1 else ()):
+            doc = "distance from the ground between two walls"
+            add(f"{place}/distance{i or ''}", solid.distance(x, z), doc)
         for i, box in enumerate(scene.obstacles):
-            add(f"{place}/room{i or ''}", box.room(scene.ground, x, z), "an obstacle")
+            away = box.solid(scene.ground).distance(x, z)
+            add(f"{place}/room{i or ''}", away, "distance from an obstacle")
     return found

@@ -95,13 +95,16 @@ def test_bounds_are_looked_at_between_nodes() -> None:
     rate[node] -= 40.0
     plan = run.plan.with_columns({"front/hip/w [rad.s-1]": rate})
     most = float(run.plan["front/hip/q"].max())
-    data = {"duration": 0.7, "nodes": 40, "bounds": {"front/hip/q": {"at_most": most}}}
+    data = {"duration": 0.7, "nodes": 40, "refine": "none"}
+    data |= {"bounds": {"front/hip/q": {"at_most": most}}}
     task = Task.model_validate(data)
     asked = resolve(task, run.model, Document(data))
     assert measured(run.model, task, asked, run.plan)[0].met
     swung = measured(run.model, task, asked, plan)[0]
     assert not swung.met and swung.node == node - 1
     assert plan.time[node - 1] < swung.time_s < plan.time[node]
+    refined = task.model_copy(update={"refine": "radau"})  # what is not refined yet: at its nodes
+    assert measured(run.model, refined, asked, plan)[0].met
 
 
 def test_an_execution_may_be_late_where_a_bound_begins() -> None:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from kemba.model import Model
 from kemba.ocp import load_task
 from kemba.ocp.reading import asked_of
-from kemba.ocp.relaxation.guess import LIFT, in_order
+from kemba.ocp.relaxation.guess import LIFT, Course, in_order
 from kemba.ocp.task.task import Task
 
 STANCES = (
@@ -13,13 +14,19 @@ STANCES = (
 )
 
 
-def foot(*words: str) -> tuple[Task, np.ndarray]:
-    """Places of the front foot (n, 2) of a jump of 0.6 m ahead."""
+def course_of(*words: str) -> tuple[Task, Model, Course]:
+    """A jump of 0.6 m ahead, at 81 moments."""
     task, document = load_task(
         "jump_forward.yaml", [f"contacts=[{STANCES}]", "distance=0.6 m", "folding=false", *words]
     )
     model, asked = asked_of(task, document)
-    course = in_order(model, task, asked, np.linspace(0.0, task.duration, 81), (0.2, 0.4))
+    moments = np.linspace(0.0, task.duration, 81)
+    return task, model, in_order(model, task, asked, moments, (0.2, 0.4))
+
+
+def foot(*words: str) -> tuple[Task, np.ndarray]:
+    """Places of the front foot (n, 2)."""
+    task, model, course = course_of(*words)
     hip = next(iter(model.mechanism.need_robot().legs.values())).hip
     hips = np.column_stack([course.x + hip * np.cos(course.pitch), course.z])
     return task, hips + course.feet["front"]
@@ -45,3 +52,18 @@ def test_a_foot_swings_over_what_stands_between(words: tuple[str, ...]) -> None:
     above = places[:, 1] - task.scene.skyline(places[:, 0])
     assert above.min() > -5e-3  # it is looked at 19 shares of the swing
     assert above.max() < 0.6
+
+
+@pytest.mark.parametrize("wall", ["0.15 m", "-0.2 m"])
+def test_the_body_flies_on_one_parabola_over_a_wall(wall: str) -> None:
+    task, _, course = course_of(f"terrain=[{{from: 0.28 m, height: {wall}}}]")
+    step = task.duration / 80
+    falls = np.diff(course.z, 2)[29:55] / step**2  # 35 % to 70 % of the motion
+    assert falls == pytest.approx(np.full(len(falls), -9.81), rel=1e-3)
+
+
+def test_a_foot_stands_where_it_is_asked_to() -> None:
+    """Its hip is beyond the edge from which the robot is to jump."""
+    words = ("start.front/foot/x={at_most: 0.23 m}", "terrain=[{from: 0.235 m, height: -0.2 m}]")
+    _, places = foot(*words)
+    assert places[0] == pytest.approx([0.23, 0.0], abs=1e-9)

@@ -15,7 +15,7 @@ def test_the_gentlest_throw_over_a_box() -> None:
     grows from a = 1/2 on, so that the corner decides.
     """
     box = Obstacle.model_validate({"from": "0.9 m", "to": "1.1 m", "height": "0.8 m"})
-    corner = box.begin - EDGE  # rounded outwards
+    corner = box.begin - EDGE / 2  # as much wider as rounded
     a = box.height / (corner * (2 - corner))
     program, point = solve(
         bead("xz", G, box),

@@ -129,7 +129,7 @@ def bead(axes: str = "x", gravity: float = 0.0, box: Obstacle | None = None) -> 
     named = zip(coordinates, velocities, strict=True)
     ports = {c.name: Port(c, w, q[i]) for i, (c, w) in enumerate(named)}
     scene = Scene(obstacles=(box,) if box else ())
-    for room in [box.room(scene.ground, q[0], q[1])] if box else []:
+    for room in [box.solid(scene.ground).distance(q[0], q[1])] if box else []:
         port = Port(Quantity("bead/room", "m"), Quantity("bead/room_rate", "m.s-1"), room)
         ports["bead/room"] = port
     known = coordinates, velocities, a + weight, ports, ()

@@ -74,14 +74,43 @@ def test_level_ground_is_plain_numbers() -> None:
     assert scene_in(HOUSE).ground.level is None and not scene_in(HOUSE).even
 
 
-def test_room_is_the_height_above_a_box_and_asks_for_nothing_beside_it() -> None:
-    scene = scene_in(HOUSE)
-    box, on = scene.obstacles[0], np.array([0.2, 0.21, 0.25])
-    assert box.room(scene.ground, on, 0.3) == pytest.approx([0.1] * 3)
-    assert (box.room(scene.ground, np.array([0.17, 0.28]), 0.0) > 0.0).all()
-    x = ca.SX.sym("x")
-    room = ca.Function("room", [x], [box.room(scene.ground, x, 0.1)])
-    assert np.array(room(on[None, :])).ravel() == pytest.approx(box.room(scene.ground, on, 0.1))
+def distances(scene: Scene) -> ca.Function:
+    """Of a point from each part of the ground, and from each obstacle."""
+    x, z = ca.SX.sym("x"), ca.SX.sym("z")
+    solids = [*scene.ground.stretches, *(box.solid(scene.ground) for box in scene.obstacles)]
+    return ca.Function("distances", [x, z], [solid.distance(x, z) for solid in solids])
+
+
+def test_a_point_is_as_far_from_a_solid_as_its_height_or_its_way_aside() -> None:
+    """Ground up to the wall at 0.45 m, behind it, behind the wall at 0.9 m; the box."""
+    far = distances(scene_in(HOUSE))
+    for x, z, found in (
+        (0.4, 0.1, [0.1, 0.03, 0.52, 0.14]),  # before the first wall
+        (0.55, 0.2, [0.2, 0.05, 0.37, 0.29]),  # on what lies behind it
+        (0.22, 0.3, [0.3, 0.21, 0.7, 0.1]),  # above the box
+        (0.1, 0.1, [0.1, 0.33, 0.82, 0.09]),  # beside it
+        (0.95, 0.0, [0.52, 0.03, 0.1, 0.69]),  # fallen off the second wall
+    ):
+        assert [float(d) for d in far(x, z)] == pytest.approx(found, abs=1e-9)
+    assert len(FLAT.ground.stretches) == 1
+    assert len(scene_in({"terrain": HOUSE["terrain"][2:3]}).ground.stretches) == 1  # a ramp: none
+
+
+def test_distances_are_smooth_and_never_more_than_there_is() -> None:
+    x, z = ca.SX.sym("x"), ca.SX.sym("z")
+    box = scene_in(HOUSE).obstacles[0].solid(FLAT.ground)
+    room = box.distance(x, z)
+    slopes = ca.gradient(room, ca.vertcat(x, z))
+    f = ca.Function("f", [x, z], [room, slopes, ca.jacobian(slopes, ca.vertcat(x, z))])
+    for place in np.random.default_rng(0).uniform([0.1, -0.1], [0.35, 0.4], (400, 2)):
+        found, slope, second = (np.array(value) for value in f(*place))
+        aside = max(box.begin - place[0], place[0] - box.end)
+        sharp = max(aside, place[1] - 0.2)
+        assert found <= sharp + 1e-12 and np.isfinite(second).all()
+        if sharp > 0.0:  # outside it changes no faster than points move
+            assert found > sharp - 1.5e-3 and np.abs(slope).sum() < 1.6
+        elif aside < -0.03 and place[1] > 0.0:  # well within, the way out is up
+            assert slope.ravel() == pytest.approx([0.0, 1.0])
 
 
 def test_a_scene_is_read_back_from_what_it_writes() -> None:

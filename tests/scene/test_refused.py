@@ -58,3 +58,19 @@ def test_motions_over_terrain_can_be_asked() -> None:
         model, requirements = check_feasible(*load_task(name))
         assert not model.mechanism.scene.even
         assert any(r.quantity.name.endswith("foot/gap") for r in requirements)
+
+
+def test_lengths_above_ground_with_walls_are_distances_from_each_part_of_it() -> None:
+    """A foot that stands is asked by its gap, what must be clear by distances; feet always are."""
+    for name, parts in (("platform.yaml", 2), ("hurdle.yaml", 0)):
+        task, document = load_task(name)
+        requirements = check_feasible(task, document)[1]
+        clear = [r for r in requirements if r.text == "clearance"]
+        assert len(clear) == 2 * max(parts, 1)
+        assert all(("distance" in r.quantity.name) == bool(parts) for r in clear)
+        assert all(r.lower == pytest.approx(0.03) for r in clear)
+        assert sum(r.location == ("terrain",) for r in requirements) == 2 * parts
+        assert {r.quantity.name for r in requirements if r.text == "end.*/foot/gap"} == {
+            "front/foot/gap",
+            "rear/foot/gap",
+        }

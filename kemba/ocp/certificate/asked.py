@@ -85,9 +85,11 @@ def measured(
     """Every requirement of a task on a plan, in the order of the task.
 
     Nodes may miss by the task's tolerance of bounds; between them, where no program asks for
-    anything, lengths and angles of a bound by what the re-simulation may.
+    anything, lengths and angles of a bound by what the re-simulation may. A plan that is yet to be
+    refined is measured at its nodes: implicit Euler is coarse between them.
     """
-    course = _Course.of(model, requirements, plan)
+    last_one = "phases" in plan.meta or task.refine != "radau"
+    course = _Course.of(model, requirements if last_one else (), plan)
     listed = (r for r in requirements if r.location[0] != "contacts")  # measured by their order
     found = [_on_plan(requirement, task, plan, course) for requirement in listed]
     return (*found, *_of_the_task(model, task, requirements, plan))

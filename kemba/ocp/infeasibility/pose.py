@@ -125,10 +125,13 @@ class Poses:
         lower, upper = self.limits(requirements)
         boxes = [*mechanism.coordinates, *mechanism.velocities]
         low, high = np.array([q.lower for q in boxes]), np.array([q.upper for q in boxes])
+        asked = {w: (a, b) for w, a, b in zip(self.names, lower, upper, strict=True)}
+        near = np.transpose([asked.get(q.name, (-np.inf, np.inf)) for q in boxes])
+        start = np.clip(np.clip(self._start(attempt), *near), low, high)
         room = np.array([10.0 * (name in may) for name in self.names])
         weight = [1.0 / self.scales[name] for name in self.names]
         found = self._solver(
-            x0=np.concatenate([np.clip(self._start(attempt), low, high), np.full(2 * n, 0.01)]),
+            x0=np.concatenate([start, np.full(2 * n, 0.01)]),
             p=[*weight, lift],
             lbx=np.concatenate([low, np.zeros(2 * n)]),
             ubx=np.concatenate([high, room, room]),

@@ -187,8 +187,8 @@ def in_order(
     turning = [not part.on for part in task.contacts] if rests else moving
     x, ground = _ahead(requirements, parts, moving, t), model.mechanism.scene.ground
     under = np.asarray(np.broadcast_to(ground.height(x), x.shape))
-    ends = float(under[0]), float(under[-1])
-    z = under + _height(task, requirements, parts, reach, gravity, rests, ends)(t)
+    stood = np.interp([0.0, *(b for _, b in parts)], t, under)
+    z = _height(task, requirements, parts, reach, gravity, rests, stood)(t)
     first, turn = _from_to(requirements, "body/pitch")
     pitch = first + turn * _shared(parts, turning if any(turning) else moving, t)
     feet, load = {}, {}
@@ -197,7 +197,8 @@ def in_order(
     here = np.clip(np.searchsorted([b for _, b in parts], t), 0, len(parts) - 1)
     for i, (leg, place) in enumerate(robot.legs.items()):
         hips = np.column_stack([x + place.hip * np.cos(pitch), z + place.hip * np.sin(pitch)])
-        foot = _foot(task, parts, standing[:, i], t, hips, reach)
+        places = [r for r in requirements if r.quantity.name == f"{leg}/foot/x" and not r.minus]
+        foot = _foot(task, parts, standing[:, i], t, hips, reach, places)
         feet[leg] = foot - hips
         load[leg] = np.where(standing[here, i], bears[here], 0.0)
     return Course(x, z, pitch, feet, load)
@@ -254,10 +255,10 @@ def _height(
     reach: tuple[float, float],
     g: float,
     rests: set[float | None],
-    ground: tuple[float, float],
+    ground: Array,
 ) -> HeightCourse:
-    """The body's height over the ground beneath it: parabolas in flights, from legs that are
-    stretched well. `ground`: its height [m] at the start and at the end."""
+    """The body's height: parabolas in flights, from legs that are stretched well. `ground`: its
+    height (parts + 1,) [m] under the body where the parts begin and end."""
     top = reach[0] + STANDS * (reach[1] - reach[0])
     low = reach[0] + FOLDED * (reach[1] - reach[0])
     flies = [not part.on for part in task.contacts]
@@ -265,19 +266,22 @@ def _height(
     lasts = [b - a for a, b in parts]
     if wrapped:
         lasts[0] = lasts[-1] = lasts[0] + lasts[-1]
-    asks = [asked(requirements, "body/z", at) for at in (0.0, 1.0)]
-    ends = [z and z - low for z, low in zip(asks, ground, strict=True)]
-    t, z, vz = [0.0], [ends[0] or (low if 0.0 in rests else top)], [0.0]
+    begin, end = (asked(requirements, "body/z", at) for at in (0.0, 1.0))
+    first = ground[0] + (low if 0.0 in rests else top)
+    t, z, vz = [0.0], [first if begin is None else begin], [0.0]
     if wrapped:
-        z[0] = top + g * lasts[0] ** 2 / 8
+        z[0] = ground[0] + top + g * lasts[0] ** 2 / 8
     for i in range(1, len(parts)):
         up, down = flies[i], flies[i - 1]
+        rises = (ground[i + 1] - ground[i]) / lasts[i] if up else 0.0
+        rises += (ground[i] - ground[i - 1]) / lasts[i - 1] if down else 0.0
         speed = g * lasts[i] / 2 if up else -g * lasts[i - 1] / 2 if down else 0.0
         t.append(parts[i][0])
-        z.append(top)
-        vz.append(speed)
+        z.append(ground[i] + top)
+        vz.append(rises + speed)
     t.append(task.duration)
-    z.append(z[0] if task.periodic is not None else ends[1] or (low if 1.0 in rests else top))
+    last = ground[-1] + (low if 1.0 in rests else top) if end is None else end
+    z.append(z[0] if task.periodic is not None else last)
     vz.append(0.0)
     return HeightCourse(t, z, vz, (0.0, 0.0))
 
@@ -297,10 +301,11 @@ def _foot(
     t: Array,
     hips: Array,
     reach: tuple[float, float],
+    asked: Sequence[Requirement],
 ) -> Array:
-    """Where a foot is (n, 2): on the ground below its hip's place in the middle of each stance, and
-    swinging between, over all that stands there; turned with the body before its first and after
-    its last stance."""
+    """Where a foot is (n, 2): on the ground below its hip's place in the middle of each stance, or
+    the nearest place that is `asked` of it there, and swinging between, over all that stands there;
+    turned with the body before its first and after its last stance."""
     runs: list[tuple[float, float]] = []
     for (begin, end), on in zip(parts, stands, strict=True):
         if on and runs and runs[-1][1] == begin:
@@ -308,6 +313,10 @@ def _foot(
         elif on:
             runs.append((begin, end))
     places = [float(np.interp((a + b) / 2, t, hips[:, 0])) for a, b in runs]
+    for i, (a, b) in enumerate(runs):
+        for r in asked:
+            if r.at is not None and a <= r.at * task.duration <= b:
+                places[i] = float(np.clip(places[i], r.lower, r.upper))
     if not runs:
         return hips - [0.0, reach[0] + FOLDED * (reach[1] - reach[0])]
     if task.periodic is not None:  # the strides before and after

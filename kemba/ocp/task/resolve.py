@@ -27,7 +27,7 @@ from kemba.ocp.task.moments import share_of
 from kemba.ocp.task.requirement import Earlier, Requirement, quantities, quantity_expression
 from kemba.ocp.task.task import Bound, CostTerm, Goal, Moment, Task
 from kemba.ocp.task.templates import TEMPLATES, with_height
-from kemba.ocp.task.terrain import rooms, scene_errors
+from kemba.ocp.task.terrain import feet_off_walls, off_walls, rooms, scene_errors
 from kemba.quantity import Quantity, to_si
 
 # `rest`: every rate is zero; `settled`: every state of an effect is where it comes to rest
@@ -78,6 +78,8 @@ def resolve(
     errors += scene_errors(task, document)
     if errors:
         raise ConfigErrors(errors)
+    requirements = [part for r in requirements for part in off_walls(r, known)]
+    requirements += feet_off_walls(model, known)
     requirements += [
         Requirement(("obstacles", i), room, None, 0.0, math.inf) for i, room in rooms(model, known)
     ]

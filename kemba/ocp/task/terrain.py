@@ -1,6 +1,9 @@
 """What the scene of a task means for its requirements: names, lines that cannot be, ground."""
 
+import math
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from kemba.config import Document
 from kemba.config.document import written
@@ -21,11 +24,41 @@ def scene_errors(task: Task, document: Document) -> list[KembaError]:
 
 
 def rooms(model: Model, known: dict[str, Quantity]) -> Iterator[tuple[int, Quantity]]:
-    """Every height above an obstacle that must not be negative, with the obstacle's number."""
+    """Every distance from an obstacle that must not be negative, with the obstacle's number."""
     for i in range(len(model.mechanism.scene.obstacles)):
         for name, quantity in known.items():
             if name.endswith(f"/room{i or ''}"):
                 yield i, quantity
+
+
+def off_walls(requirement: Requirement, known: dict[str, Quantity]) -> list[Requirement]:
+    """A height above the ground that must not be less than some length, as that distance from every
+    part of ground with walls, where heights jump from node to node; else the requirement itself."""
+    place, _, what = requirement.quantity.name.rpartition("/")
+    parts = distances(place, known) if what == "gap" else []
+    least = requirement.lower > 0.0 and requirement.upper == math.inf
+    if not parts or not least or requirement.minus or requirement.aim:
+        return [requirement]
+    return [replace(requirement, quantity=part) for part in parts]
+
+
+def distances(place: str, known: dict[str, Quantity]) -> list[Quantity]:
+    """How far a point is from every part of ground with walls; none without walls."""
+    names = (name for name in known if re.fullmatch(rf"{place}/distance\d*", name))
+    return [known[name] for name in names]
+
+
+SINKS = 1e-3  # m; a foot that stands on a part of the ground keeps to it by its contact alone
+
+
+def feet_off_walls(model: Model, known: dict[str, Quantity]) -> list[Requirement]:
+    """Feet beside walls or above them, also where no `clearance` is asked: of a motion that grazes
+    one an execution runs into it."""
+    return [
+        Requirement(("terrain",), part, None, -SINKS, math.inf)
+        for leg in model.mechanism.legs
+        for part in distances(f"{leg}/foot", known)
+    ]
 
 
 def ground_at(model: Model, requirements: Sequence[Requirement], at: float) -> float:
