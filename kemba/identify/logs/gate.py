@@ -38,6 +38,7 @@ FEWEST = 60  # rows that the log of a moving rig needs
 FEWEST_STILL = 8  # readings per channel that a vessel's log needs
 MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
+END = 0.1  # share of the stroke that a moving rod leaves; a tenth is another unit
 UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
@@ -308,6 +309,11 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
             what = f"moves by {1e3 * _travel(y):.4g} mm"
             expected = f"a stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
             yield _log_fault(log, what, expected, "is its unit wrong? See --map", column=name)
+        elif name == "piston/x" and np.nanmax(np.abs(y)) < END * log.meta["stroke"]:
+            what = f"stays within {1e3 * np.nanmax(np.abs(y)):.3g} mm of the retracted end"
+            expected = f"motion along the stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
+            hint = "its unit is wrong (see --map), or the rod must be moved farther"
+            yield _log_fault(log, what, expected, hint, column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
