@@ -14,7 +14,8 @@ from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array, Flags, Rows
 from kemba.identify.robot.batch import Batch, ResampledLog
-from kemba.identify.robot.mix_ups import command_mix_ups, corrected, in_the_air
+from kemba.identify.robot.mix_ups import SAME, Left, command_mix_ups, corrected, in_the_air, slight
+from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.state import LinearisedState
 
 HINT = "correct it in a column map (--map)"
@@ -23,7 +24,7 @@ SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was sm
 
 
 def mixed_commands(
-    state: LinearisedState, rows: Rows, r: Array, errs: Callable[[ResampledLog], float]
+    state: LinearisedState, rows: Rows, r: Array, errs: Left
 ) -> Iterator[KembaError]:
     """The mistake about commands, or two of them, without which the model as it is leaves much less
     than the residual r (n,), run by run, with all that leave as little; of a flight, in which feet
@@ -43,7 +44,7 @@ def mixed_commands(
             after = {text: rms(other[own]) for text, other in left.items()}
             if some == 1:
                 known = in_the_air(physics, log)
-                after |= {m.text: errs(corrected(log, physics, [m])) for m in known}
+                after |= {m.text: float(errs(corrected(log, physics, [m]))[0]) for m in known}
             best = min(after, key=after.__getitem__)
             power = _power(physics.channels, left.get(best, 0.0 * r), rows, own)
             if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
@@ -55,10 +56,21 @@ def mixed_commands(
             return
 
 
-def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:
-    """Mistakes that move feet by millimetres, where no lengths make them stand as well."""
-    what = "corrected, feet stand on level ground; else legs of other lengths would be needed"
-    return KembaError(", ".join(runs), "; or ".join(mistakes), what, HINT)
+def slightly_mixed_up(
+    physics: Physics, logs: Sequence[ResampledLog], left: Left
+) -> Iterator[KembaError]:
+    """Mistakes that move feet by millimetres, of each log: those without which the model leaves
+    little, and less than with them. A robot that leans or sinks moves in another way."""
+    as_read, known = left(*logs), slight(physics.legs)
+    after = {m.text: left(*(corrected(log, physics, [m]) for log in logs)) for m in known}
+    for i, log in enumerate(logs):
+        least = min(error[i] for error in after.values())
+        if SAME * least < as_read[i] and least < BETTER:
+            said = "; or ".join(text for text, error in after.items() if error[i] <= SAME * least)
+            what = (
+                f"the log errs by {as_read[i]:.2g} times its noise, and by {least:.2g} times then"
+            )
+            yield KembaError(log.name, said, what, HINT)
 
 
 # When robot logs contradict themselves or any model.
