@@ -84,7 +84,7 @@ def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
             gains["axis/tau"] = "motor"
     return tuple(
         f"the gain of {channel} would be off by more than any {what}'s is; its unit is wrong, or "
-        "its scale in a map (--map)"
+        "its scale or offset in a map (--map)"
         for channel, what in gains.items()
     )
 

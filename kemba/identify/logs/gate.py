@@ -342,7 +342,8 @@ COARSE = 5e-3  # steps of a channel, as a share of its range, that are worth a r
 
 def limits_of(logs: Sequence[Trajectory]) -> list[str]:
     """Remarks on what these logs cannot show, or show worse than others would."""
-    return [*_slow(logs), *_uneven(logs), *_odd(logs), *_coarse(logs), *_unused(logs)]
+    found = _slow(logs), _uneven(logs), _odd(logs), _coarse(logs), _unused(logs), _locked(logs)
+    return [remark for remarks in found for remark in remarks]
 
 
 def _slow(logs: Sequence[Trajectory]) -> Iterable[str]:
@@ -419,4 +420,15 @@ def _unused(logs: Sequence[Trajectory]) -> Iterable[str]:
         yield (
             "chamber pressures are in these logs and are not used: of a robot the motion alone is "
             "explained. Take a bench log of this cylinder to use its pressures"
+        )
+
+
+def _locked(logs: Sequence[Trajectory]) -> Iterable[str]:
+    still = GateSettings.moves
+    if all("piston/x" in log and _travel(log["piston/x"]) <= still for log in logs):
+        places = sorted({f"{1e3 * np.nanmedian(log['piston/x']):.0f}" for log in logs})
+        yield (
+            f"the rod does not move (piston/x {', '.join(places)} mm): friction, damping and "
+            "cushions do not show, and a wrong place or scale of piston/x looks like other air; a "
+            "log in which the rod moves tells them"
         )
