@@ -237,11 +237,14 @@ def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
         yield _swap("the commands of the legs are swapped", *crossed.values())
 
 
-def in_the_air(physics: Physics, log: ResampledLog) -> list[MixUp]:
+def without_zeros(legs: Sequence[str], stroke: float) -> list[MixUp]:
     """Mistakes in the columns of a log whose feet tell nothing, but for those of a zero."""
-    known = mix_ups(physics.legs, physics.mechanism.stroke)
-    told = _Feet(physics, log).restless([]) is not None
-    return [] if told else [mistake for mistake in known if mistake.at is None]
+    return [mistake for mistake in mix_ups(legs, stroke) if mistake.at is None]
+
+
+def in_flight(physics: Physics, log: ResampledLog) -> bool:
+    """Whether no foot stands for long enough to tell anything."""
+    return _Feet(physics, log).restless([]) is None
 
 
 def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:

@@ -41,7 +41,7 @@ from kemba.identify.robot.forces import (
     robot_operating_point,
 )
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
-from kemba.identify.robot.mix_ups import Left, mixed_up
+from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.noise import (
     Noise,
     expected_power,
@@ -105,7 +105,8 @@ class RobotProblem(Problem):
         left = self._left(physics)
         self.standing = StandingLengths()
         slight = list(slightly_mixed_up(physics, batch.resampled, left))
-        if not slight:
+        self.flights = [log.name for log in batch.resampled if in_flight(physics, log)]
+        if not slight and len(self.flights) < len(logs):
             self.standing = standing_lengths(physics, batch, reference, self.candidates)
         legs = self.standing.lengths
         logs_mixed = (mixed_up(physics, log, legs, left) for log in batch.resampled)
@@ -270,11 +271,16 @@ class RobotProblem(Problem):
         return robot_force_channels(self.state)
 
     def validate(self) -> list[str]:
-        """Which lengths make the feet stand, where they are not the model's. Raises BadData where
-        a log contradicts itself or any model."""
+        """Which lengths make the feet stand, where they are not the model's, and what cannot be
+        told where none stands. Raises BadData where a log contradicts itself or any model."""
         if faults := self._faults():
             raise BadData(faults)
-        return remarks(self.standing)
+        zeros = (
+            "wrong zeros of the height, the pitch, hips and pistons cannot be told from missing "
+            "effects; a log in which the robot stands tells them"
+        )
+        all_fly = len(self.flights) == len(self.runs)
+        return [f"no foot stands: {zeros}"] if all_fly else remarks(self.standing)
 
     def _faults(self) -> list[KembaError]:
         """What is wrong with the logs, the simplest first: columns by the feet alone, commands by
