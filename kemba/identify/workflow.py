@@ -118,7 +118,7 @@ def discover_logs(
         _check_disjoint(fitted, kept)
         fitted, kept, said = _kept_aside(fitted, kept)
         built = model_of(fitted, model)
-        checked = [*check_all([*fitted, *kept], built), *limits_of(fitted)]
+        checked = check_all([*fitted, *kept], built)
         say("finding the motion in the logs")
         problem, remarks = admitted(fitted, built)
         remarks = [*said, *evidence_faults(model), *built.remarks, *checked, *remarks]
@@ -232,7 +232,7 @@ def check_all(logs: Sequence[Trajectory], model: Model) -> list[str]:
     Raises BadData with every fault.
     """
     taken_on(logs, model.mechanism)
-    return check_logs(logs)
+    return [*check_logs(logs), *limits_of(logs)]
 
 
 def admitted(logs: Sequence[Trajectory], model: Model) -> tuple[Problem, list[str]]:

@@ -13,7 +13,11 @@ from kemba.logs.columns import ColumnMap
 from kemba.logs.recording import Column, Raw
 from kemba.trajectory import Array
 
-MISSING = ["", *"nan NaN NAN na NA null NULL none None -".split()]
+# what programs write where there is no reading, spreadsheets for a fault too
+MISSING = [
+    "",
+    *"nan NaN NAN na NA n/a N/A #N/A #NA <NA> NaT null NULL none None - -- #VALUE! #DIV/0!".split(),
+]
 PIECE = 50_000  # rows that are read at a time: their texts take more memory than the numbers
 WIDE = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")  # pandas of a long row
 COMMENT = ("#", "%", "//")  # before a header, as of numpy.savetxt
@@ -166,5 +170,5 @@ def as_numbers(cells: Column, decimal: str) -> tuple[Array, np.ndarray[Any, Any]
     texts = texts.str.replace(",", ".", regex=False) if decimal == "," else texts
     texts = texts.replace({"true": "1", "on": "1", "false": "0", "off": "0"})
     numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
-    empty = texts.isin(["", "nan", "na", "null", "none", "-"]).to_numpy()
+    empty = texts.isin([text.lower() for text in MISSING]).to_numpy()
     return numbers, ~np.isfinite(numbers) & ~empty

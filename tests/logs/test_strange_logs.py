@@ -1,5 +1,6 @@
 """Logs in the ways of other programs are read right, or a person is asked; none is read wrong."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, load_map
 from kemba.logs.draft.draft import draft_map
+from kemba.logs.formats.arrays import read_json
 from kemba.logs.times import seconds
 from kemba.trajectory import Trajectory
 
@@ -217,3 +219,72 @@ def test_the_pitch_of_a_quaternion(tmp_path: Path) -> None:
     (tmp_path / "map.yaml").write_text(draft.text("log.csv"))
     back = read_log(tmp_path / "log.csv", load_map(tmp_path / "map.yaml"))
     assert back["body/pitch"] == pytest.approx(log["body/pitch"], abs=1e-9)
+
+
+def plain_log(folder: Path, more: dict[str, object] | None = None) -> tuple[Path, pd.DataFrame]:
+    log = robot_log()
+    columns = {"time": log.time, **{name.replace("/", "_"): log[name] for name in log.names}}
+    frame = pd.DataFrame(columns | (more or {}))
+    return folder / "log.csv", frame
+
+
+@pytest.mark.parametrize("unit", ["gon", "rev", "counts"])
+def test_a_unit_in_a_row_of_its_own_is_applied_or_asked_about(unit: str, tmp_path: Path) -> None:
+    """One that is not known is no reason to guess another one."""
+    path, frame = plain_log(tmp_path)
+    size = {"gon": 200 / np.pi, "rev": 0.5 / np.pi, "counts": 4096 / np.pi}[unit]
+    angles = [name for name in frame if name.endswith(("_q", "pitch"))]
+    frame[angles] *= size
+    head, *rows = frame.to_csv(index=False).split("\n")
+    units = ",".join(unit if name in angles else "" for name in frame)
+    path.write_text("\n".join([head, units, *rows]))
+    draft = draft_map(path, ("front", "rear"), 0.07)
+    said = "; ".join(draft.questions)
+    if unit == "counts":
+        assert "front/hip/q [rad]: 'front_hip_q' is in 'counts', which is no unit" in said
+    else:
+        assert {draft.columns[f"{leg}/hip/q [rad]"]["unit"] for leg in ("front", "rear")} == {unit}
+
+
+@pytest.mark.parametrize("form", ["a list", "lines"])
+def test_json_of_rows_is_read(form: str, tmp_path: Path) -> None:
+    """Objects within them too; what one row lacks, or is null in it, is missing."""
+    rows = [{"time": 1e-3 * i, "hip": {"q": None if i == 3 else 0.1 * i}} for i in range(80)]
+    rows[5]["note"] = "here"  # type: ignore[assignment]
+    texts = [json.dumps(row) for row in rows]
+    path = tmp_path / "log.json"
+    path.write_text("\n".join(texts) if form == "lines" else f"[{', '.join(texts)}]")
+    found = read_json(path)
+    q = found.columns["hip/q"]
+    assert np.isnan(q[3]) and q[4] == pytest.approx(0.4) and len(q) == 80
+
+
+@pytest.mark.parametrize("mark", ["#N/A", "n/a", "<NA>", "--", "#DIV/0!"])
+def test_marks_of_missing_readings(mark: str, tmp_path: Path) -> None:
+    path, frame = plain_log(tmp_path)
+    frame = frame.astype(object)
+    frame.loc[7, "body_z"] = mark
+    frame.to_csv(path, index=False)
+    target = tmp_path / "map.yaml"
+    target.write_text(draft_map(path, ("front", "rear"), 0.07).text(path.name))
+    assert np.flatnonzero(np.isnan(read_log(path, load_map(target))["body/z"])).tolist() == [7]
+
+
+@pytest.mark.parametrize("line", ["header", "End of log"])
+def test_a_line_that_is_no_data_is_told_where_it_stands(line: str, tmp_path: Path) -> None:
+    dates = pd.date_range("2026-01-05", periods=400, freq="ms").strftime("%d.%m.%Y %H:%M:%S.%f")
+    path, frame = plain_log(tmp_path, {"time": dates})
+    text = frame.to_csv(index=False).split("\n")
+    text.insert(200, text[0] if line == "header" else line)
+    path.write_text("\n".join(text))
+    with pytest.raises(KembaError, match=r"log.csv:201: '.*' stands in .* other cells are times"):
+        draft_map(path, ("front", "rear"), 0.07)
+
+
+def test_of_two_torques_the_commanded_one_is_taken(tmp_path: Path) -> None:
+    noisy = robot_log()["front/hip/tau"] + 0.5
+    path, frame = plain_log(tmp_path, {"front_hip_torque_measured": noisy})
+    frame = frame.rename(columns={"front_hip_tau": "hip_front_torque_cmd"})
+    frame.to_csv(path, index=False)
+    found = draft_map(path, ("front", "rear"), 0.07).columns["front/hip/tau [N.m]"]
+    assert found["source"] == "hip_front_torque_cmd"

@@ -15,6 +15,7 @@ from kemba.identify.infer.windows import excess
 from kemba.identify.problem.sensor_faults import is_fault
 
 GROSS = 0.2  # error of a gain that is another unit, and no sensor's: ten times its usual size
+MOTOR = 2.0  # the same of the factor by which a motor's force is off, which is known to 10 %
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,18 @@ def caveats_of(
 
 
 def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
-    """What to say of sensors whose gain would be off by more than that of any sensor is."""
-    scales = (effect for effect in best if effect.startswith("sensor_scale:"))
+    """What to say of sensors and motors whose gain would be off by more than that of any is."""
+    gains: dict[str, str] = {}
+    for effect in best:
+        kind, _, channel = effect.partition(":")
+        if kind == "sensor_scale" and abs(values(search, best, effect)["k"].value) > GROSS:
+            gains[channel] = "sensor"
+        if kind == "axis_scale" and not 1 / MOTOR < values(search, best, effect)["k"].value < MOTOR:
+            gains["axis/tau"] = "motor"
     return tuple(
-        f"the gain of {effect.partition(':')[2]} would be off by more than any sensor's is; its "
-        "unit is wrong, or its scale in a map (--map)"
-        for effect in scales
-        if abs(values(search, best, effect)["k"].value) > GROSS
+        f"the gain of {channel} would be off by more than any {what}'s is; its unit is wrong, or "
+        "its scale or offset in a map (--map)"
+        for channel, what in gains.items()
     )
 
 

@@ -38,6 +38,7 @@ FEWEST = 60  # rows that the log of a moving rig needs
 FEWEST_STILL = 8  # readings per channel that a vessel's log needs
 MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
+END = 0.1  # share of the stroke that a moving rod leaves; a tenth is another unit
 UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
@@ -308,6 +309,11 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
             what = f"moves by {1e3 * _travel(y):.4g} mm"
             expected = f"a stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
             yield _log_fault(log, what, expected, "is its unit wrong? See --map", column=name)
+        elif name == "piston/x" and np.nanmax(np.abs(y)) < END * log.meta["stroke"]:
+            what = f"stays within {1e3 * np.nanmax(np.abs(y)):.3g} mm of the retracted end"
+            expected = f"motion along the stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
+            hint = "its unit is wrong (see --map), or the rod must be moved farther"
+            yield _log_fault(log, what, expected, hint, column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
@@ -336,7 +342,8 @@ COARSE = 5e-3  # steps of a channel, as a share of its range, that are worth a r
 
 def limits_of(logs: Sequence[Trajectory]) -> list[str]:
     """Remarks on what these logs cannot show, or show worse than others would."""
-    return [*_slow(logs), *_uneven(logs), *_odd(logs), *_coarse(logs), *_unused(logs)]
+    found = _slow(logs), _uneven(logs), _odd(logs), _coarse(logs), _unused(logs), _locked(logs)
+    return [remark for remarks in found for remark in remarks]
 
 
 def _slow(logs: Sequence[Trajectory]) -> Iterable[str]:
@@ -413,4 +420,15 @@ def _unused(logs: Sequence[Trajectory]) -> Iterable[str]:
         yield (
             "chamber pressures are in these logs and are not used: of a robot the motion alone is "
             "explained. Take a bench log of this cylinder to use its pressures"
+        )
+
+
+def _locked(logs: Sequence[Trajectory]) -> Iterable[str]:
+    still = GateSettings.moves
+    if all("piston/x" in log and _travel(log["piston/x"]) <= still for log in logs):
+        places = sorted({f"{1e3 * np.nanmedian(log['piston/x']):.0f}" for log in logs})
+        yield (
+            f"the rod does not move (piston/x {', '.join(places)} mm): friction, damping and "
+            "cushions do not show, and a wrong place or scale of piston/x looks like other air; a "
+            "log in which the rod moves tells them"
         )

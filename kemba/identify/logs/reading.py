@@ -55,7 +55,8 @@ RANGES = {
     "piston/x": (
         -0.01,
         1.0,
-        "metres from 0 (retracted) to the stroke; is it in millimetres, or counted backwards?",
+        "metres from 0 (retracted) to the stroke; is it in millimetres, counted backwards, or a "
+        "share of the stroke (`unit: 70 mm` in a map, of a stroke of 70 mm)?",
     ),
     "piston/v": (-8.0, 8.0, "metres per second; is it in mm/s?"),
     "piston/F": (-3000.0, 3000.0, "newtons, pushing positive"),

@@ -131,9 +131,10 @@ def _shaped(candidate: Candidate, typical: Mapping[str, float]) -> Candidate:
     reach = CandidateSettings.reach
     shapes = []
     for shape in candidate.shapes:
-        name = f"{candidate.effect}.{shape.name}"
+        name, declared = f"{candidate.effect}.{shape.name}", BY_KIND[candidate.effect].declared()
         if name in typical:
-            low, high = typical[name] / reach, typical[name] * reach
+            low = max(typical[name] / reach, declared[shape.name].lower)
+            high = min(typical[name] * reach, declared[shape.name].upper)
             shape = replace(shape, typical=typical[name], lower=low, upper=high)
         shapes.append(shape)
     return replace(candidate, shapes=tuple(shapes))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -17,26 +18,35 @@ from kemba.model.model import Model
 Gap = Callable[[RigLog], Array]  # the force of the model less that of the log, along a log
 LEAST = 0.15  # zero [rad] from which it is a mistake, and no fault of a sensor
 ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
+# factor from which a gain is another unit, and no other inertia: the closest usual units, feet and
+# metres, have 3.28
+UNIT = 3.0
+SIZES = np.linspace(-9.0, 9.0, 33)  # logarithms of those that are tried first
 
 
 def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` (k,) of the gap."""
-    force = log.channels.others[ANSWER[model.mechanism.rig]][log.channels.rows]
+    answer = ANSWER[model.mechanism.rig]
     side, still = 1.0 if model.mechanism.bore else -1.0, model.mechanism.sign_speed
-    size = float(np.linalg.norm(force / sigma))
+
+    def size(trial: RigLog) -> float:
+        force = trial.channels.others[answer][trial.channels.rows]
+        return float(np.linalg.norm(force / sigma))
 
     def left(trial: RigLog) -> float:
-        """What a friction of any size, which every rig may have, leaves."""
-        friction = side * np.tanh(trial.speed / still)
-        return float(nnls((friction / sigma)[:, None], gap(trial) / sigma)[1]) / size
+        """The share of the force that friction and damping of any size leave: every rig may have
+        these."""
+        friction = side * np.stack([np.tanh(trial.speed / still), trial.speed], axis=1)
+        return float(nnls(friction / sigma[:, None], gap(trial) / sigma)[1]) / size(trial)
 
-    small = SMALL * np.sqrt(len(sigma)) / size
+    small = SMALL * np.sqrt(len(sigma)) / size(log)
     if left(log) < small:
         return []
     trials = {texts: left(trial) for texts, trial in mix_ups(log, model, left)}
     said = "; or ".join(map(" and ".join, simplest(trials, small)))
     what = "the force answers the motion so much better then"
-    return [KembaError(log.name, said, what, "correct it in a column map (--map)")] if said else []
+    hint = "correct it in a column map (--map), or the rig's figures in the model"
+    return [KembaError(log.name, said, what, hint)] if said else []
 
 
 def mix_ups(
@@ -54,10 +64,17 @@ def mix_ups(
         trial = _moved(log, sign, bore.stroke if bore and sign < 0.0 else 0.0, others)
         yield texts, trial
         if logged[place] == "rad":  # where it hangs straight down
-            zero = _zero(trial, others, left)
+            zero = _best(ZEROS, partial(_moved, trial, 1.0, others=others), left)
             moved = f"{place} counts from another zero (`offset: {np.degrees(zero):+.1f} deg`)"
             if abs(zero) > LEAST:
                 yield (*texts, moved), _moved(trial, 1.0, zero, others)
+        for name in () if said else (answer,) if bore else (place, answer):
+            size = _best(SIZES, partial(_scaled, trial, name), left)
+            times = np.exp(abs(size))
+            if times > UNIT:
+                about = f"{name} is about {float(f'{times:.2g}'):g} times"
+                wrong = f"{about} too {'small' if size > 0.0 else 'large'} (its unit is wrong)"
+                yield (*texts, wrong), _scaled(trial, name, size)
 
 
 def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]]]:
@@ -73,18 +90,28 @@ def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]
             yield (*said, moved), columns | {name: columns[name] + zero for name in names}
 
 
-def _moved(log: RigLog, sign: float, zero: float, others: dict[str, Array]) -> RigLog:
-    """A log whose position is sign * q + zero, with its other channels."""
-    c, turned = log.channels, {n: sign * getattr(log.channels, n) for n in ("v", "a", "quick")}
-    moved = {n: sign * getattr(c, n) + zero for n in ("q", "read")}
+def _moved(log: RigLog, gain: float, zero: float, others: dict[str, Array]) -> RigLog:
+    """A log whose position is gain * q + zero, with its other channels."""
+    c, turned = log.channels, {n: gain * getattr(log.channels, n) for n in ("v", "a", "quick")}
+    moved = {n: gain * getattr(c, n) + zero for n in ("q", "read")}
     return replace(log, channels=replace(c, others=others, **moved, **turned))
 
 
-def _zero(log: RigLog, others: dict[str, Array], left: Callable[[RigLog], float]) -> float:
-    """The zero [rad] after which least is left."""
+def _scaled(log: RigLog, name: str, size: float) -> RigLog:
+    """A log with exp(size) times the readings of one channel."""
+    gain, others = float(np.exp(size)), log.channels.others
+    if name in others:
+        return _moved(log, 1.0, 0.0, {**others, name: gain * others[name]})
+    return _moved(log, gain, 0.0, others)
 
-    def error(zero: float) -> float:
-        return left(_moved(log, 1.0, zero, others))
 
-    near, step = min(ZEROS, key=error), ZEROS[1] - ZEROS[0]
+def _best(
+    tried: Array, change: Callable[[float], RigLog], left: Callable[[RigLog], float]
+) -> float:
+    """What a log is changed by where least is left of it; `tried` at even distances first."""
+
+    def error(by: float) -> float:
+        return left(change(by))
+
+    near, step = min(tried, key=error), tried[1] - tried[0]
     return float(minimize_scalar(error, bounds=(near - step, near + step), method="bounded").x)

@@ -8,8 +8,7 @@ foot sinks into it as it is loaded, and its load goes with the body's accelerati
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from copy import copy
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -18,9 +17,8 @@ from scipy.optimize import least_squares
 
 from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.problem.types import Array, Candidate, Flags
-from kemba.identify.robot.batch import Batch, ResampledLog
+from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
-from kemba.identify.robot.mix_ups import SAME, MixUp, corrected, slight
 from kemba.identify.robot.physics import Physics, SampleMap
 from kemba.identify.robot.reference import Reference
 from kemba.mechanism.knee import flexion_of
@@ -53,8 +51,6 @@ HELD = 1e-6  # width of what is not free, as a share: as good as none
 DEEP = 0.02  # depth below the ground at which no foot can be [m]
 OFTEN = 0.01  # share of samples so deep from which lengths are not believed
 GAIN = 6.0  # gain over faults of sensors alone from which lengths are believed [nats]
-# gain of a mistake in the columns over any lengths from which there may be one [nats]
-MISTAKEN = 12.0
 # prior sigma of the zero of the pitch where mistakes are judged: no zero is taken for one [rad]
 PITCH = 0.05
 
@@ -62,12 +58,10 @@ PITCH = 0.05
 @dataclass(frozen=True)
 class StandingLengths:
     """Theta with the `lengths` [m] at which feet stand; `lever`: share by which a longer boom makes
-    them stand as well, 0 where none does; `mistakes` in the columns: they stand without any of them
-    better than with any lengths."""
+    them stand as well, 0 where none does."""
 
     lengths: Mapping[str, float] = field(default_factory=dict)
     lever: float = 0.0
-    mistakes: tuple[str, ...] = ()
 
 
 class Standing:
@@ -90,18 +84,6 @@ class Standing:
         load = np.maximum(1.0 + batch.flat(lift)[::step, 0], 0.0)
         self.samples = [q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None]]
         self._map = SampleMap(self._function(physics))
-
-    def without(self, mistake: MixUp) -> Standing:
-        """The same with a mistake in the columns put right."""
-        found, legs = copy(self), self.physics.legs
-        body, pistons, load = self.samples
-        names = ["body/x", "body/z", "body/pitch", *(f"{leg}/hip/q" for leg in legs)]
-        y = dict(zip(names, body.T, strict=True))
-        y |= {f"{leg}/piston/x": x for leg, x in zip(legs, pistons.T, strict=True)}
-        y |= mistake.change(y)
-        columns = np.stack(list(y.values()), axis=1)
-        found.samples = [columns[:, : len(names)], columns[:, len(names) :], load]
-        return found
 
     def _function(self, physics: Physics) -> ca.Function:
         """(q without knees, pistons, load, x) -> heights (legs,) and their slopes along x."""
@@ -141,10 +123,9 @@ def standing_lengths(
     batch: Batch,
     reference: Reference,
     candidates: Mapping[str, Candidate],
-    left: Callable[[ResampledLog], float],
 ) -> StandingLengths:
     """The lengths at which feet stand on the ground; none where those of the model are as good, or
-    where no lengths are candidates. `left`: what the model leaves of a log."""
+    where no lengths are candidates."""
     sizes = {c.key: c.lead.size for c in candidates.values() if c.effect.startswith(GEOMETRY)}
     if not sizes:
         return StandingLengths()
@@ -164,8 +145,6 @@ def standing_lengths(
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
-    if _mistaken(standing, x, width, rows) and (mistakes := told_by_motion(physics, batch, left)):
-        return StandingLengths(mistakes=mistakes)
     if x[-2] > SOFT or min(_drawn(standing, x, width, rows)) - cost < GAIN:
         return StandingLengths()
     singles = [_only(standing, (i,), x, width, rows) for i in range(len(sizes))]
@@ -192,40 +171,6 @@ def remarks(found: StandingLengths) -> list[str]:
         return [f"{said}; contacts were read with that"]
     other = f"or if the boom is {100 * found.lever:+.1f} % longer than drawn"
     return [f"{said}, {other}; contacts were read with the former"]
-
-
-def _mistaken(standing: Standing, x: Array, width: Array, rows: Flags) -> bool:
-    """Whether feet stand better without a slight mistake in the columns than with any lengths.
-
-    Each is judged by the samples (n, legs) that stand with or without it: `rows` with it, fitted by
-    `x`.
-    """
-    loose, gains = width.copy(), list[float]()
-    loose[len(standing.names)] = PITCH
-    drawn = loose.copy()
-    drawn[: len(standing.names)] *= HELD
-    for mistake in slight(standing.physics.legs):
-        other = standing.without(mistake)
-        either = rows | _refined(other, np.zeros(len(x)), drawn)[2]
-        _, best, _ = _refined(standing, x, loose, either)
-        _, cost, _ = _refined(other, np.zeros(len(x)), drawn, either)
-        gains.append(best - cost)
-    return max(gains) > MISTAKEN
-
-
-def told_by_motion(
-    physics: Physics, batch: Batch, left: Callable[[ResampledLog], float]
-) -> tuple[str, ...]:
-    """The slight mistakes without which the model leaves least of the logs, and less than as they
-    are: which one it is, and whether it is none but a late sensor, heights of feet cannot tell."""
-    after = {
-        mistake.text: sum(left(corrected(log, physics, [mistake])) for log in batch.resampled)
-        for mistake in slight(physics.legs)
-    }
-    least = min(after.values())
-    if SAME * least > sum(map(left, batch.resampled)):
-        return ()
-    return tuple(text for text, error in after.items() if error <= SAME * least)
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:

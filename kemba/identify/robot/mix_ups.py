@@ -29,6 +29,7 @@ from kemba.identify.robot.physics import Physics
 
 Columns = Mapping[str, Any]  # readings (n,), or the pulses of a valve
 Change = Callable[[Columns], dict[str, Any]]
+Left = Callable[..., Array]  # of logs: what the model leaves of each (logs,), in its noise
 HINT = "correct it with `sign`, `scale`, `offset` or `source` in a column map (--map)"
 CARRIED = 5.0  # the body falls slower than this: the ground carries it [m.s-2]: g / 2
 WINDOW = 0.1  # time in which a standing foot does not move [s]
@@ -76,7 +77,7 @@ def mixed_up(
     physics: Physics,
     log: ResampledLog,
     lengths: Theta | None = None,
-    left: Callable[[ResampledLog], float] = lambda _: 1.0,
+    left: Left = lambda *logs: np.ones(len(logs)),
 ) -> Iterator[KembaError]:
     """The mistake in the columns of a log, or two of them, if its feet stand much better without.
 
@@ -101,7 +102,7 @@ def mixed_up(
             close = [some for after, some in trials if after < min(goal, ALIKE * best)]
             least = ZERO if lengths else SMALL
             if not all(feet.is_effect(some, least) for some in close):
-                rest = [left(corrected(log, physics, some)) for some in close]
+                rest = [left(corrected(log, physics, some))[0] for some in close]
                 close = [s for s, e in zip(close, rest, strict=True) if e <= SAME * min(rest)]
             texts = {m.text for some in close for m in some}
             close = [some for some in close if not any(m.plain in texts for m in some)]
@@ -197,18 +198,20 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
             "seen from its other side)"
         )
         turned = _each(text, ["body/x", "body/pitch"], np.negative)
-        swap = _swap(text, *pairs)
-        both = turned.about | swap.about
-        yield MixUp(text, both, lambda y: {**swap.change(y), **turned.change(y)})
+        yield _together(text, turned, _swap(text, *pairs))
 
 
 def slight(legs: Sequence[str]) -> Iterator[MixUp]:
-    """Those of them that move feet by millimetres only in a motion that is even and upright."""
-    yield _each(TURNED, ["body/pitch"], np.negative)
+    """Those of them that move feet by millimetres only in a motion that is even and upright; both
+    together leave feet nearly where they are."""
+    pitch = _each(TURNED, ["body/pitch"], np.negative)
+    yield pitch
     if len(legs) == 2:
-        yield _swap(
+        pistons = _swap(
             "piston/x of the legs is swapped", (f"{legs[0]}/piston/x", f"{legs[1]}/piston/x")
         )
+        yield pistons
+        yield _together(f"{TURNED} and {pistons.text}", pitch, pistons)
 
 
 def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
@@ -234,11 +237,14 @@ def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:
         yield _swap("the commands of the legs are swapped", *crossed.values())
 
 
-def in_the_air(physics: Physics, log: ResampledLog) -> list[MixUp]:
+def without_zeros(legs: Sequence[str], stroke: float) -> list[MixUp]:
     """Mistakes in the columns of a log whose feet tell nothing, but for those of a zero."""
-    known = mix_ups(physics.legs, physics.mechanism.stroke)
-    told = _Feet(physics, log).restless([]) is not None
-    return [] if told else [mistake for mistake in known if mistake.at is None]
+    return [mistake for mistake in mix_ups(legs, stroke) if mistake.at is None]
+
+
+def in_flight(physics: Physics, log: ResampledLog) -> bool:
+    """Whether no foot stands for long enough to tell anything."""
+    return _Feet(physics, log).restless([]) is None
 
 
 def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:
@@ -249,6 +255,12 @@ def _groups(legs: Sequence[str]) -> list[tuple[str, list[str]]]:
 
 def _each(text: str, names: Sequence[str], change: Callable[[Any], Any]) -> MixUp:
     return MixUp(text, frozenset(names), lambda y: {n: change(y[n]) for n in names if n in y})
+
+
+def _together(text: str, one: MixUp, other: MixUp) -> MixUp:
+    """Two mistakes about different columns as one."""
+    about = one.about | other.about
+    return MixUp(text, about, lambda y: {**one.change(y), **other.change(y)})
 
 
 def _zero(
@@ -274,10 +286,8 @@ def _zero(
         there = _each("", names, lambda x: sign * x - zero)
         turned = _each("", also, np.negative)
         slight = abs(more) < least
-        return MixUp(
-            f"{text} ({said})",
-            there.about | turned.about,
-            lambda y: {**there.change(y), **turned.change(y)},
+        return replace(
+            _together(f"{text} ({said})", there, turned),
             small=sign > 0.0 and start == 0.0 and slight,
             plain=plain if slight else "",
         )

@@ -1,6 +1,6 @@
 """Robot logs under one model as whitened residuals: the innovations of a filter around the data."""
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -41,7 +41,7 @@ from kemba.identify.robot.forces import (
     robot_operating_point,
 )
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
-from kemba.identify.robot.mix_ups import mixed_up
+from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.noise import (
     Noise,
     expected_power,
@@ -103,11 +103,14 @@ class RobotProblem(Problem):
         sensors = SensorFaults(model.effects)
         reference = first_reference(physics, batch, physics.nominal)
         left = self._left(physics)
-        self.standing = standing_lengths(physics, batch, reference, self.candidates, left)
+        self.standing = StandingLengths()
+        slight = list(slightly_mixed_up(physics, batch.resampled, left))
+        self.flights = [log.name for log in batch.resampled if in_flight(physics, log)]
+        if not slight and len(self.flights) < len(logs):
+            self.standing = standing_lengths(physics, batch, reference, self.candidates)
         legs = self.standing.lengths
-        self.mixed = [f for log in batch.resampled for f in mixed_up(physics, log, legs, left)]
-        if not self.mixed and self.standing.mistakes:
-            self.mixed = [slightly_mixed_up(self.runs, self.standing.mistakes)]
+        logs_mixed = (mixed_up(physics, log, legs, left) for log in batch.resampled)
+        self.mixed = [fault for faults in logs_mixed for fault in faults] or slight
         if self.mixed:  # lengths are not fitted to a log whose zeros are in doubt
             self.standing = StandingLengths()
         self.lengths = lengths = dict(self.standing.lengths)
@@ -268,11 +271,16 @@ class RobotProblem(Problem):
         return robot_force_channels(self.state)
 
     def validate(self) -> list[str]:
-        """Which lengths make the feet stand, where they are not the model's. Raises BadData where
-        a log contradicts itself or any model."""
+        """Which lengths make the feet stand, where they are not the model's, and what cannot be
+        told where none stands. Raises BadData where a log contradicts itself or any model."""
         if faults := self._faults():
             raise BadData(faults)
-        return remarks(self.standing)
+        zeros = (
+            "wrong zeros of the height, the pitch, hips and pistons cannot be told from missing "
+            "effects; a log in which the robot stands tells them"
+        )
+        all_fly = len(self.flights) == len(self.runs)
+        return [f"no foot stands: {zeros}"] if all_fly else remarks(self.standing)
 
     def _faults(self) -> list[KembaError]:
         """What is wrong with the logs, the simplest first: columns by the feet alone, commands by
@@ -284,14 +292,15 @@ class RobotProblem(Problem):
             return faults
         return list(contradictions(self.state, rows, r, self._sensor_columns))
 
-    def _left(self, physics: Physics) -> Callable[[ResampledLog], float]:
-        """What the model leaves of another log."""
+    def _left(self, physics: Physics) -> Left:
+        """What the model leaves of other logs."""
 
-        def left(log: ResampledLog) -> float:
-            batch, sensors = Batch((log,)), SensorFaults(self.model.effects)
+        def left(*logs: ResampledLog) -> Array:
+            batch, sensors = Batch(logs), SensorFaults(self.model.effects)
             ground, noise = ground_of(self.model)[1], stated_noise(batch)
             state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
-            return rms(state.pick(state.residuals([{}])))
+            r, run = state.pick(state.residuals([{}])), describe(state).run
+            return np.array([rms(r[run == i]) for i in range(len(logs))])
 
         return left
 

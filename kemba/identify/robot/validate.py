@@ -14,16 +14,26 @@ from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array, Flags, Rows
 from kemba.identify.robot.batch import Batch, ResampledLog
-from kemba.identify.robot.mix_ups import command_mix_ups, corrected, in_the_air
+from kemba.identify.robot.mix_ups import (
+    SAME,
+    Left,
+    command_mix_ups,
+    corrected,
+    in_flight,
+    slight,
+    without_zeros,
+)
+from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.state import LinearisedState
 
 HINT = "correct it in a column map (--map)"
 BETTER = 2.0  # factor by which a log must err less without a mistake about its commands
+WHOLE = 1.2  # what the model leaves of a flight whose columns are right: zeros leave more
 SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was smoothed with it
 
 
 def mixed_commands(
-    state: LinearisedState, rows: Rows, r: Array, errs: Callable[[ResampledLog], float]
+    state: LinearisedState, rows: Rows, r: Array, errs: Left
 ) -> Iterator[KembaError]:
     """The mistake about commands, or two of them, without which the model as it is leaves much less
     than the residual r (n,), run by run, with all that leave as little; of a flight, in which feet
@@ -42,8 +52,10 @@ def mixed_commands(
             own = rows.run == i
             after = {text: rms(other[own]) for text, other in left.items()}
             if some == 1:
-                known = in_the_air(physics, log)
-                after |= {m.text: errs(corrected(log, physics, [m])) for m in known}
+                known = without_zeros(physics.legs, physics.mechanism.stroke)
+                known = known if in_flight(physics, log) else []
+                told = {m.text: float(errs(corrected(log, physics, [m]))[0]) for m in known}
+                after |= {text: error for text, error in told.items() if error < WHOLE}
             best = min(after, key=after.__getitem__)
             power = _power(physics.channels, left.get(best, 0.0 * r), rows, own)
             if after[best] * BETTER < before[i] and max(power.values()) < ABSURD:
@@ -55,10 +67,21 @@ def mixed_commands(
             return
 
 
-def slightly_mixed_up(runs: Sequence[str], mistakes: Sequence[str]) -> KembaError:
-    """Mistakes that move feet by millimetres, where no lengths make them stand as well."""
-    what = "corrected, feet stand on level ground; else legs of other lengths would be needed"
-    return KembaError(", ".join(runs), "; or ".join(mistakes), what, HINT)
+def slightly_mixed_up(
+    physics: Physics, logs: Sequence[ResampledLog], left: Left
+) -> Iterator[KembaError]:
+    """Mistakes that move feet by millimetres, of each log: those without which the model leaves
+    little, and less than with them. A robot that leans or sinks moves in another way."""
+    as_read, known = left(*logs), slight(physics.legs)
+    after = {m.text: left(*(corrected(log, physics, [m]) for log in logs)) for m in known}
+    for i, log in enumerate(logs):
+        least = min(error[i] for error in after.values())
+        if SAME * least < as_read[i] and least < BETTER:
+            said = "; or ".join(text for text, error in after.items() if error[i] <= SAME * least)
+            what = (
+                f"the log errs by {as_read[i]:.2g} times its noise, and by {least:.2g} times then"
+            )
+            yield KembaError(log.name, said, what, HINT)
 
 
 # When robot logs contradict themselves or any model.
@@ -107,7 +130,8 @@ def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
             at = int(np.argmax(depth))
             far = f"{1e3 * depth[at]:.0f} mm below the ground at {log.time[at]:.3f} s"
             what = f"the {leg} foot would be {far}"
-            hint = f"is a sign of body/pitch or {leg}/hip/q turned, or are columns swapped?"
+            angles = f"body/pitch, {leg}/hip/q or {leg}/piston/x"
+            hint = f"is a sign or a zero of body/z, {angles} wrong, or are columns swapped?"
             yield KembaError(log.name, what, "a foot on or above it was expected", hint)
 
 

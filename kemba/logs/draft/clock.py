@@ -18,6 +18,7 @@ from kemba.trajectory import Array
 FIELDS = ("position", "velocity", "effort")
 REPEATED = 0.15  # share of rising steps where up to six topics have rows of one stamp
 RISING = 0.99  # share of steps that must rise: a few repeats are for the gate to tell
+ODD = 0.05  # share of the cells of a column that may be of another kind than the others
 STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
 ALIKE = 0.02  # share by which two clocks of one log may differ
 SURE = (5e-5, 0.05)  # s between rows that leave no doubt about a time in s
@@ -64,6 +65,20 @@ def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
         if np.isfinite(values).any():
             found[name] = values
     return found
+
+
+def odd_cell(raw: Raw, decimal: str) -> tuple[str, int, str] | None:
+    """A column, a row of it from 0 whose text is another thing than nearly all others, and what
+    these are."""
+    for name, cells in raw.items():
+        if cells.dtype != object:
+            continue
+        stamps = [times.seconds(np.array([cell, cell], dtype=object)) is None for cell in cells]
+        kinds = {"numbers": as_numbers(cells, decimal)[1], "times": np.array(stamps)}
+        for kind, wrong in kinds.items():
+            if 0.0 < wrong.mean() < ODD:
+                return name, int(np.argmax(wrong)), kind
+    return None
 
 
 def switches(raw: Raw) -> set[str]:

@@ -14,7 +14,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap, shipped_maps
 from kemba.logs.draft import matching
-from kemba.logs.draft.clock import joint_state_labels, numbers, stamp_of, switches
+from kemba.logs.draft.clock import joint_state_labels, numbers, odd_cell, stamp_of, switches
 from kemba.logs.draft.matching import (
     Assigned,
     Target,
@@ -29,14 +29,13 @@ from kemba.logs.draft.words import (
     SPELT,
     WORDS,
     Names,
-    is_unit,
     quaternions,
     strange_unit,
     upright,
     words,
 )
 from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
-from kemba.logs.text import cells_of, encoding, joined
+from kemba.logs.text import cells_of, encoding, first_row, joined
 from kemba.trajectory import TIME, Array
 
 LINES = 300  # as many are looked at; a table that changes later is told when it is read
@@ -198,6 +197,12 @@ def draft_map(
     values = numbers(raw.columns, trial.decimal)
     stamp = stamp_of(raw.columns, values, names)
     if stamp is None:
+        if odd := odd_cell(raw.columns, trial.decimal):
+            text = path.suffix.lower() in TEXTS
+            where = f"{path}:{odd[1] + first_row(path, trial)}" if text else str(path)
+            what = f"'{raw.columns[odd[0]][odd[1]]}' stands in the column '{odd[0]}', whose other"
+            hint = "is this line a remark, or a second header? Then take it out"
+            raise KembaError(where, f"{what} cells are {odd[2]}", hint=hint)
         what = f"no column rises from row to row like a time; it holds {held(raw.columns)}"
         raise KembaError(str(path), what, "a time was expected")
     rest = {n: v for n, v in values.items() if n not in {*stamp.names, *raw.clocks.values()}}
@@ -234,9 +239,8 @@ def draft_map(
 
 
 def _spelt(units: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """The units of columns as pint spells them; texts that are no units are left out."""
-    spelt = {name: SPELT.get(text, text) for name, text in units}
-    return {name: unit for name, unit in spelt.items() if is_unit(unit)}
+    """The units of columns as pint spells them."""
+    return {name: SPELT.get(text, text) for name, text in units if text}
 
 
 def _kind(
@@ -293,7 +297,8 @@ def _asked(target: Target, name: str, names: Names) -> list[str]:
     """What a person has to say about a column that was found."""
     found = []
     written = names.labels.get(name, name)
-    strange = strange_unit(written, names.legs)
+    stated = f"[{names.below[name]}]" if name in names.below else ""
+    strange = strange_unit(written, names.legs) or strange_unit(stated, names.legs)
     if strange and names.unit(name) is None and not target.is_valve:
         found.append(f"{target.header}: '{name}' is in '{strange}', which is no unit that is known")
     if target.header.endswith("piston/x [m]") and names.unit(name) is None:

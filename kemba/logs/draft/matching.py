@@ -167,7 +167,7 @@ NOTHING = -1.0  # of a name that says something else
 ENOUGH = 0.6  # two of three words are enough, half not
 SAID_TOO = 0.1  # for a name that also says what it may
 UNRELATED = 0.3  # doubt by a word about something else, as the `a` of `valve_a`
-ASKED_FOR = 0.3  # of what was desired or commanded where a measured column is wanted
+ASKED_FOR = 0.3  # of what was desired or commanded where a measured column is wanted, or inversely
 STRANGER = 0.03  # for each word that says nothing, up to three
 SURE = 0.02  # a change of the whole assignment that costs less is as good
 
@@ -298,6 +298,7 @@ def agreement(says: Meaning, target: Target) -> float:
             score += SAID_TOO * (target.may[group] != "position")
         elif group not in target.means:
             score -= UNRELATED * (group in ("kind", "leg", "part"))
-    if "desired" in says.get("role", ()) and not target.is_valve:
+    other = "measured" if target.is_command else "desired"
+    if other in says.get("role", ()) and not target.is_valve:
         score -= ASKED_FOR
     return score

@@ -56,10 +56,11 @@ WORDS: dict[str, dict[str, str]] = {
 }
 TIMES = (
     "t time timestamp stamp clock epoch elapsed zeit zeitstempel uhrzeit datum date datetime sec "
-    "secs tout"
+    "secs tout millis micros uptime"
 )
 FILLERS = frozenset(
-    "robot header state states joint joints data value values m s log sensors topic".split()
+    "robot header state states joint joints data value values m s log sensors topic float double "
+    "int bool".split()
 )
 # what a quantity was read by: it tells columns of one quantity apart, and makes none the better one
 SENSORS = frozenset(
@@ -94,7 +95,8 @@ Meaning = dict[str, set[str]]
 @dataclass(frozen=True)
 class Names:
     """The names of a log's columns: the machine's legs, what headerless columns are called, units
-    that the file states apart, columns that say `on` and `off`, and the unit of all angles."""
+    that the file states apart (`below`: those that are none too), columns that say `on` and `off`,
+    and the unit of all angles."""
 
     legs: Sequence[str] = ()
     labels: Mapping[str, str] = field(default_factory=dict)
@@ -105,7 +107,8 @@ class Names:
 
     def unit(self, name: str) -> str | None:
         """The unit that a column's name tells, else the one that the file states."""
-        return named_unit(self.labels.get(name, name))[1] or self.below.get(name)
+        stated = self.below.get(name, "")
+        return named_unit(self.labels.get(name, name))[1] or (stated if is_unit(stated) else None)
 
     def bare(self, name: str) -> str:
         """A column's name, or what it is called where it has none, without the unit."""

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -63,16 +63,17 @@ def write_json(trajectory: Trajectory, path: Path) -> None:
 
 
 def read_json(path: Path) -> Recording:
-    """Columns by name, under `columns` or at the top; null is a missing reading. Raises KembaError
-    where the file is no such object."""
+    """Columns by name, under `columns` or at the top, or rows: a list of objects, or one a line.
+    null is a missing reading. Raises KembaError where the file is none of these."""
     try:
-        content = _content(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        content = _rows(text) or _content(text)
         columns = content.get("columns", content)
         found = {k: _array(v) for k, v in columns.items() if isinstance(v, list | np.ndarray)}
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except (ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise KembaError(str(path), f"is no JSON object of columns: {error}") from None
+        raise KembaError(str(path), f"is no JSON of columns or rows: {error}") from None
     meta = content.get("meta", {})
     return replace(vectors(found, path), meta=meta if isinstance(meta, dict) else {})
 
@@ -110,6 +111,36 @@ def _matrix(name: str, array: Column, arrays: Mapping[str, Column]) -> Raw:
     if len(set(names)) != tall.shape[1]:
         names = [f"{name}/{i}" for i in range(1, tall.shape[1] + 1)]
     return {label: tall[:, i] for i, label in enumerate(names)}
+
+
+def _rows(text: str) -> dict[str, Any]:
+    """The columns of a JSON text of rows; none where it is an object of columns."""
+    first, _, more = text.strip().partition("\n")
+    try:
+        start = json.loads(first) if first[:1] == "{" and more else None
+    except ValueError:  # an object goes on in the next line
+        start = None
+    if first[:1] != "[" and start is None:
+        return {}
+    rows = (
+        [json.loads(line) for line in text.splitlines() if line.strip()]
+        if start
+        else json.loads(text)
+    )
+    if not rows or not all(isinstance(row, dict) for row in rows):
+        raise ValueError("a list of objects was expected")
+    flat = [dict(_leaves(row)) for row in rows]
+    names = dict.fromkeys(name for row in flat for name in row)
+    return {name: [row.get(name) for row in flat] for name in names}
+
+
+def _leaves(row: dict[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    """What an object holds by `path/key`."""
+    for key, value in row.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{path}{key}/")
+        elif not isinstance(value, list):
+            yield f"{path}{key}", value
 
 
 def _content(text: str) -> dict[str, Any]:
@@ -153,14 +184,17 @@ def _begin(text: str, at: int) -> int:
 
 
 def _array(values: list[Any] | Column) -> Column:
-    """A list of JSON as an array: of texts, of numbers that no float holds, else of floats."""
+    """A list of JSON as an array: of numbers that no float holds, else of floats, else of texts."""
     if isinstance(values, np.ndarray):
         return values
     if values and all(isinstance(value, str) for value in values):
         return np.array(values)
     if values and all(type(value) is int for value in values):
         return np.array(values)
-    return np.array(values, dtype=float)
+    try:
+        return np.array(values, dtype=float)
+    except (ValueError, TypeError):  # texts, some of them missing
+        return np.array(["" if value is None else str(value) for value in values])
 
 
 def metadata(text: Any) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import json
 import math
 from array import array
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -73,12 +73,13 @@ class Topic:
         found: Raw = {}
         for shape in self._shapes.values():
             table = np.frombuffer(shape.numbers).reshape(len(shape.rows), len(shape.names))
+            rows = np.array(shape.rows)
             for name, values in zip(shape.names, table.T, strict=True):
                 if name in shape.texts:
                     continue
                 if name not in found:
                     found[name] = np.full(len(self.stamps), np.nan)
-                found[name][shape.rows] = values
+                found[name][rows] = values
         self._shapes = {key: replace(s, numbers=array("d")) for key, s in self._shapes.items()}
         return found
 
@@ -213,9 +214,15 @@ def _leaves(value: Any, numbers: array[float], signs: list[Any]) -> None:
         numbers.append(float(value))
         signs.append("number")
     else:
-        items = _items(value)
-        signs.append((*items, *_entries(items)) if "name" in items else tuple(items))
-        for item in items.values():
+        keys = KNOWN[kind] if kind in KNOWN else _fields(kind)
+        if keys and "name" not in keys:
+            signs.append(keys)
+            values: Iterable[Any] = [getattr(value, key) for key in keys]
+        else:
+            items = _items(value)
+            signs.append((*items, *_entries(items)) if "name" in items else tuple(items))
+            values = items.values()
+        for item in values:
             if type(item) in (float, int):  # most are, and a call takes longer than all else
                 numbers.append(item)
                 signs.append("number")

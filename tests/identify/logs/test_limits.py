@@ -37,3 +37,13 @@ def test_pressures_of_a_robot_are_told_not_to_be_used() -> None:
 
 def test_a_usual_log_needs_no_remark() -> None:
     assert not limits_of([log(1e-3, 2e-5)])
+
+
+def test_what_a_locked_rod_does_not_show_is_said_unless_another_log_moves() -> None:
+    still, moving = (
+        log(1e-3).with_columns({"piston/x [m]": 0.035 + np.linspace(0.0, travel, 400)})
+        for travel in (0.0, 0.03)
+    )
+    (remark,) = limits_of([still])
+    assert remark.startswith("the rod does not move (piston/x 35 mm): friction, damping and")
+    assert limits_of([still, moving]) == []

@@ -53,6 +53,56 @@ def test_a_mistake_is_named_and_once_followed_nothing_is_left(
     assert np.sqrt(np.mean(right.residual({}) ** 2)) < 2.0  # of the noise
 
 
+@pytest.mark.parametrize(
+    ("column", "factor", "words"),
+    [
+        (
+            "axis/q [rad]",
+            0.1,
+            r"run: axis/q is about (10|9\.\d) times too small \(its unit is wrong\)",
+        ),
+        (
+            "axis/q [rad]",
+            np.degrees(1.0),
+            r"run: axis/q is about 5\d times too large .its unit is wrong",
+        ),
+        (
+            "axis/tau [N.m]",
+            4.448,
+            r"run: axis/tau is about 4.\d times too large .its unit is wrong",
+        ),
+        (
+            "axis/tau [N.m]",
+            -0.001,
+            r"reversed sign and axis/tau is about 1\d00 times too small .its unit",
+        ),
+    ],
+)
+def test_another_unit_of_a_drive_is_named_and_a_heavier_axis_is_none(
+    column: str, factor: float, words: str
+) -> None:
+    right, model = pendulum(Q, FORCE + A * 0.02), load_model("pendulum_rig")
+    columns = dict(zip(right.headers, (right[name] for name in right.names), strict=True))
+    assert rig_problem([right], model).validate() == []
+    columns[column] = factor * columns[column]
+    with pytest.raises(BadData) as raised:
+        rig_problem([Trajectory(TIME, columns, right.meta)], model).validate()
+    assert re.search(words, str(raised.value)), str(raised.value)
+
+
+@pytest.mark.parametrize("column", ["axis/q [m]", "axis/tau [N]"])
+def test_without_a_weight_another_unit_is_that_of_the_motion_or_of_the_force(
+    column: str, tmp_path: Path
+) -> None:
+    dump_yaml({"rig": {"kind": "drive", "inertia": "2 kg"}}, tmp_path / "model.yaml")
+    columns = {"axis/q [m]": Q, "axis/tau [N]": 2.0 * A + 3.0 * np.tanh(V / 0.01)}
+    small = column == "axis/q [m]"
+    columns[column] = columns[column] * (0.1 if small else 10.0)
+    log = Trajectory(TIME, columns, RUN | {"kind": "drive"})
+    with pytest.raises(BadData, match=r"axis/q is .* too small .*; or axis/tau is .* too large"):
+        rig_problem([log], load_model(tmp_path / "model.yaml")).validate()
+
+
 def test_a_cylinder() -> None:
     """The force alone tells its sign; where it does not hang on the position, the end is open."""
     pressure = 3e5 + 1e5 * np.sin(3.0 * TIME)
@@ -136,11 +186,8 @@ def test_a_seal_rubs_against_the_motion_and_tells_the_end(tmp_path: Path) -> Non
     [
         ("piston/x [m]", 10.0, r"moves by 599.9 mm; a stroke of 120 mm was expected; is its unit"),
         ("piston/x [m]", 39.37, "moves by .* is its unit wrong"),
-        (
-            "piston/F [N]",
-            1 / 4.448,
-            "gain of piston/F would be off by more than any sensor.s is; its",
-        ),
+        ("piston/x [m]", 0.1, "within 9 mm of the retracted end; motion along .*unit is wrong"),
+        ("piston/F [N]", 1 / 4.448, r"piston/F is about 4.\d times too small .its unit is wrong"),
         ("chamber/retract/P [Pa]", 1.6, "gain of chamber/retract/P would be off"),
     ],
 )
@@ -151,6 +198,13 @@ def test_another_unit_is_no_effect(column: str, factor: float, words: str, tmp_p
     Trajectory(TIME, {**read, column: factor * read[column]}, {"kind": "cylinder"}).write(log)
     answer, _ = discover_logs([log], (), str(tmp_path / "model.yaml"))
     assert not answer.writes and re.search(words, answer.sentence), answer.sentence
+
+
+def test_a_motor_of_another_unit_beside_a_heavier_axis_is_no_effect(tmp_path: Path) -> None:
+    log = pendulum(Q, 4.448 * (FORCE + 0.05 * A))
+    log.write(tmp_path / "log.csv")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), "pendulum_rig")
+    assert not answer.writes and "off by more than any motor's is; its unit" in answer.sentence
 
 
 def test_friction_and_small_zeros_are_no_mistakes() -> None:

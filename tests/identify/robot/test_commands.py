@@ -72,6 +72,33 @@ def test_two_mistakes_about_commands(logs: list[Trajectory]) -> None:
         problem(taken(logs[0], read)).validate()
 
 
+def in_the_air(log: Trajectory) -> Trajectory:
+    air = (log.time > 0.24) & (log.time < 0.42)
+    read = dict(zip(log.headers, (log[name][air] for name in log.names), strict=True))
+    return Trajectory(log.time[air], read, log.meta)
+
+
+@pytest.mark.parametrize(
+    ("column", "zero"),
+    [("body/z", 0.3), ("body/z", -0.1), ("hip/q", np.pi / 2), ("rear/hip/q", -0.3),
+     ("body/pitch", 0.2), ("piston/x", 0.01)],
+)  # fmt: skip
+def test_zeros_of_a_flight_are_never_taken_for_another_mistake(
+    column: str, zero: float, logs: list[Trajectory]
+) -> None:
+    """They are doubted where a foot is in the ground, or said to be unknown."""
+    flight = in_the_air(logs[0])
+    moved = {name: flight[name] + zero for name in flight.names if name.endswith(column)}
+    found = problem(taken(flight, moved))
+    assert found.lengths == {}
+    try:
+        (said,) = found.validate()
+    except BadData as refused:
+        assert "is a sign or a zero of" in str(refused) or "a sign turned" in str(refused)
+    else:
+        assert said.startswith("no foot stands: wrong zeros of the height, the pitch, hips and pi")
+
+
 @pytest.mark.parametrize(
     ("columns", "change", "words"),
     [
@@ -84,9 +111,7 @@ def test_a_flight_tells_mistakes_by_what_the_model_leaves(
     columns: list[str], change: Callable[[Array], Array], words: str, logs: list[Trajectory]
 ) -> None:
     """No foot stands for long enough."""
-    air = (logs[0].time > 0.24) & (logs[0].time < 0.42)
-    read = dict(zip(logs[0].headers, (logs[0][name][air] for name in logs[0].names), strict=True))
-    flight = Trajectory(logs[0].time[air], read, logs[0].meta)
+    flight = in_the_air(logs[0])
     problem(flight).validate()
     with pytest.raises(BadData, match=words):
         problem(taken(flight, {name: change(flight[name]) for name in columns})).validate()

@@ -61,6 +61,18 @@ def test_a_pitch_of_the_other_sign_is_told_where_it_is_small() -> None:
         problem.validate()
 
 
+@pytest.mark.parametrize("seed", [12, 4])
+def test_a_pitch_and_pistons_that_hide_each_other_from_the_feet_are_named(seed: int) -> None:
+    """An even hop and one of 45 degrees: feet stand as well as they should, the motion does not."""
+    (log,), _ = hops(runs=1, seed=seed, figures_off=0.01)
+    front, rear = (f"{leg}/piston/x" for leg in ("front", "rear"))
+    crossed = {f"{front} [m]": log[rear], f"{rear} [m]": log[front]}
+    mixed = with_pitch(log, np.negative).with_columns(crossed)
+    words = "hop0: body/pitch has the reversed sign .* and piston/x of the legs is swapped; the"
+    with pytest.raises(BadData, match=words):
+        robot_problem([mixed], load_model("planning")).validate()
+
+
 @pytest.mark.parametrize(
     "change", [lambda p: p, lambda p: p + 0.03, lambda p: p - 0.03, lambda p: 1.1 * p]
 )

@@ -10,11 +10,11 @@ from robot_logs import hops
 
 from kemba.errors import KembaError
 from kemba.identify.problem.types import Array
-from kemba.identify.robot.batch import Batch, ResampledLog
-from kemba.identify.robot.geometry import told_by_motion
+from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.mix_ups import mix_ups, mixed_up
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.problem import RobotProblem
+from kemba.identify.robot.validate import slightly_mixed_up
 from kemba.model.spec import load_model
 
 Change = Callable[[Array], Array]
@@ -188,11 +188,15 @@ def test_pistons_of_the_legs_are_told_from_the_pitch(
 def test_whether_the_pitch_is_turned_is_told_by_the_motion(
     truth: int, told: int, physics: Physics, standing: ResampledLog
 ) -> None:
-    """Of a late sensor, feet may stand better with the pitch turned: then the model leaves more."""
+    """Of a late sensor, feet may stand better with the pitch turned: then the model leaves more. It
+    is told of each log, and not where much is left even then."""
     log = changed(standing, physics, pitch=lambda p: truth * p)
-    off = lambda log: 1.0 + float(np.abs(log.y - standing.y).max())  # noqa: E731
-    said = told_by_motion(physics, Batch((log,)), off)
-    assert len(said) == told and all("body/pitch has the reversed sign" in text for text in said)
+    left = lambda *logs: np.array([1.0 + np.ptp(x.y - standing.y) for x in logs])  # noqa: E731
+    said = [str(fault) for fault in slightly_mixed_up(physics, (standing, log), left)]
+    assert len(said) == told
+    assert all("body/pitch has the reversed sign (nose up is positive); the" in t for t in said)
+    most = lambda *logs: 2.0 + left(*logs)  # noqa: E731
+    assert not list(slightly_mixed_up(physics, (standing, log), most))
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -217,7 +221,7 @@ def test_what_feet_cannot_tell_the_model_tells(physics: Physics, standing: Resam
         (torque, "stand: hip/q of every leg has the reversed sign; corrected"),
         (-torque, "stand: hip/q and hip/tau of every leg have the reversed sign; corrected"),
     ):
-        off = lambda log, truth=truth: 1.0 + float(np.abs(log.torque - truth).max())  # noqa: E731
+        off = lambda log, truth=truth: [1.0 + np.abs(log.torque - truth).max()]  # noqa: E731
         (fault,) = mixed_up(physics, turned, None, off)
         assert words in str(fault)
 
