@@ -380,7 +380,7 @@ def test_a_recording_that_breaks_off_is_read_and_told(
     whole = tdms(robot_log(), tmp_path / "log.tdms").read_bytes()
     (tmp_path / "log.tdms").write_bytes(whole[: len(whole) // 2])
     raw = raw_columns(tmp_path / "log.tdms", None)
-    assert raw.remarks == ("it breaks off: its channels end at different times",)
+    assert raw.remarks[0] == "it breaks off: its channels end at different times"
     lengths = {len(raw.columns[name]) for name in raw.clocks}
     assert len(lengths) == 3 and all(
         len(raw.columns[name]) == len(raw.columns[clock]) for name, clock in raw.clocks.items()
