@@ -6,10 +6,10 @@
     python benchmarks/random_mutants.py --again          # the survivors, with today's tests
 
 The list with its outcomes is benchmarks/random_mutants.jsonl; it is kept after every bug, so that
-an interrupted study goes on. What an earlier draw has left untried stays listed as `left`. Survivors
-that change no behaviour stand, by hand, in benchmarks/random_mutants.yaml. A bug is run against the
-quick tests that run its line, quickest first, all of them or those of --seconds. Needs the test dependencies and pytest-cov:
-pip install '.[test]' pytest-cov.
+an interrupted study goes on. What an earlier draw has left untried stays listed as `left`.
+Survivors that change no behaviour stand, by hand, in benchmarks/random_mutants.yaml. A bug is run
+against the quick tests that run its line, quickest first, all of them or those of --seconds. Needs
+the test dependencies and pytest-cov: pip install '.[test]' pytest-cov.
 """
 
 import argparse
