@@ -105,6 +105,13 @@ def function(test: str) -> str:
     return test.partition("[")[0].partition("|")[0]
 
 
+def in_function(file: Path, line: int) -> bool:
+    """Whether a line is run when a function is called, not when its module is loaded."""
+    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+    bodies = [n.body for n in nodes if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return any(body[0].lineno <= line <= (body[-1].end_lineno or 0) for body in bodies)
+
+
 class Covering:
     """Which tests run a line."""
 
@@ -120,12 +127,13 @@ class Covering:
                 self.seconds[name] = self.seconds.get(name, 0.0) + float(case.get("time") or 0.0)
 
     def tests(self, bug: dict[str, Any]) -> dict[str, float]:
-        """Seconds of the tests that run a bug's line, quickest first; where it is run only when
-        its module is loaded, of those that run anything of the module."""
+        """Seconds of the tests that run a bug's line, quickest first; where it is run when its
+        module is loaded, of those that run anything of the module."""
         lines = self.data.contexts_by_lineno(str(ROOT / bug["file"]))
         own = {function(context) for context in lines.get(bug["line"], ()) if context}
         every = {function(context) for found in lines.values() for context in found}
-        found = {name: self.seconds[name] for name in own or every if name in self.seconds}
+        asked = own if in_function(ROOT / bug["file"], bug["line"]) else every
+        found = {name: self.seconds[name] for name in asked if name in self.seconds}
         return dict(sorted(found.items(), key=lambda pair: pair[1]))
 
 
