@@ -128,11 +128,11 @@ class Covering:
 
     def tests(self, bug: dict[str, Any]) -> dict[str, float]:
         """Seconds of the tests that run a bug's line, quickest first; where it is run when its
-        module is loaded, of those that run anything of the module."""
+        module is loaded, or as machine code, of those that run anything of the module."""
         lines = self.data.contexts_by_lineno(str(ROOT / bug["file"]))
         own = {function(context) for context in lines.get(bug["line"], ()) if context}
         every = {function(context) for found in lines.values() for context in found}
-        asked = own if in_function(ROOT / bug["file"], bug["line"]) else every
+        asked = own if own and in_function(ROOT / bug["file"], bug["line"]) else every
         found = {name: self.seconds[name] for name in asked if name in self.seconds}
         return dict(sorted(found.items(), key=lambda pair: pair[1]))
 

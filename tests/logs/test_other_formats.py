@@ -44,7 +44,10 @@ def test_mdf(piece: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     """Two groups at their own rates, units as the file states them, in however many pieces."""
     monkeypatch.setattr("kemba.logs.formats.measured.PIECE", piece)
     log = robot_log()
-    back = read_back(mdf(log, tmp_path / "log.mf4"), tmp_path)
+    units = raw_columns(mdf(log, tmp_path / "log.mf4"), None).units
+    assert units["front_hip_q"] == "deg" and units["rear_hip_tau"] == "Nm"
+    assert "front_piston_x" not in units
+    back = read_back(tmp_path / "log.mf4", tmp_path)
     same(back, log, 1e-6)
     assert np.isfinite(back["body/z"]).sum() == 40 and len(back) == 400
     assert "have a clock of their own" in back.meta["read"][0]
