@@ -1,10 +1,14 @@
 """The course of a start guess: where feet are between their stances."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from kemba.ocp import load_task
 from kemba.ocp.reading import asked_of
+from kemba.ocp.relaxation import guess
 from kemba.ocp.relaxation.guess import LIFT, in_order
 from kemba.ocp.task.task import Task
 
@@ -45,3 +49,18 @@ def test_a_foot_swings_over_what_stands_between(words: tuple[str, ...]) -> None:
     above = places[:, 1] - task.scene.skyline(places[:, 0])
     assert above.min() > -5e-3  # it is looked at 19 shares of the swing
     assert above.max() < 0.6
+
+
+def test_the_body_goes_ahead_from_the_end_of_its_first_stance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """To a speed of 1 m/s at the end, evenly: a triangle of speed over 0.5 s."""
+    monkeypatch.setattr(guess, "_from_to", lambda *_: (0.3, 0.0))
+    speed: Any = SimpleNamespace(
+        at=1.0, lower=1.0, upper=1.0, minus=None, location=("end",),
+        quantity=SimpleNamespace(name="body/vx"),
+    )  # fmt: skip
+    t = np.linspace(0.0, 0.7, 701)
+    x = guess._ahead([speed], [(0.0, 0.2), (0.2, 0.5), (0.5, 0.7)], [False, True, True], t)
+    assert x[t <= 0.2] == pytest.approx(0.3)
+    assert x[-1] == pytest.approx(0.3 + 0.25)
