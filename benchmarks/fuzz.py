@@ -3,6 +3,7 @@
     python benchmarks/fuzz.py                             # 100 inputs of every kind
     python benchmarks/fuzz.py --examples 1000 --seed 7    # more, others
     python benchmarks/fuzz.py --only tasks --only sidecars
+    python benchmarks/fuzz.py --formats --examples 300    # each binary format of logs by itself
     python benchmarks/fuzz.py --afresh                    # drop the counts of older code first
 
 The inputs and the rule stand in tests/fuzz. What breaks the rule is printed, the shortest input of
@@ -25,7 +26,9 @@ from program import add, forget
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from fuzz.trial import TRIALS
+from fuzz.trial import FORMATS, TRIALS
+
+EVERY = TRIALS | FORMATS
 
 OFTEN = 25  # inputs after which counts are recorded; a run may be interrupted
 
@@ -34,7 +37,7 @@ def tried(
     name: str, examples: int, number: int, folder: Path
 ) -> tuple[Counter[str], dict[str, str]]:
     """Counts of what happened, and the shortest input of each kind of break."""
-    inputs, run = TRIALS[name]
+    inputs, run = EVERY[name]
     count: Counter[str] = Counter()
     broken: dict[str, str] = {}
     recorded: Counter[str] = Counter()
@@ -74,13 +77,14 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--examples", type=int, default=100, help="inputs of each kind")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", action="append", choices=list(TRIALS), help="of these kinds only")
+    parser.add_argument("--only", action="append", choices=list(EVERY), help="of these kinds only")
+    parser.add_argument("--formats", action="store_true", help="of each binary format of logs")
     parser.add_argument("--afresh", action="store_true", help="forget earlier counts of a kind")
     parser.add_argument("--keep", type=Path, help="folder for inputs that break the rule")
     arguments = parser.parse_args()
     warnings.simplefilter("error")
     wrong = 0
-    for name in arguments.only or TRIALS:
+    for name in arguments.only or (FORMATS if arguments.formats else TRIALS):
         began = time.process_time()
         if arguments.afresh:
             forget("fuzz", name)

@@ -6,15 +6,16 @@
     python benchmarks/random_mutants.py --again          # the survivors, with today's tests
 
 The list with its outcomes is benchmarks/random_mutants.jsonl; it is kept after every bug, so that
-an interrupted study goes on. A draw drops what was never tried and keeps the rest. Survivors that
-change no behaviour stand, by hand, in benchmarks/random_mutants.yaml. A bug is run against all
-quick tests that run its line, quickest first. Needs the test dependencies and pytest-cov:
-pip install '.[test]' pytest-cov.
+an interrupted study goes on. What an earlier draw has left untried stays listed as `left`.
+Survivors that change no behaviour stand, by hand, in benchmarks/random_mutants.yaml. A bug is run
+against the quick tests that run its line, quickest first, all of them or those of --seconds. Needs
+the test dependencies and pytest-cov: pip install '.[test]' pytest-cov.
 """
 
 import argparse
 import ast
 import json
+import math
 import os
 import random
 import re
@@ -22,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -103,6 +105,13 @@ def function(test: str) -> str:
     return test.partition("[")[0].partition("|")[0]
 
 
+def in_function(file: Path, line: int) -> bool:
+    """Whether a line is run when a function is called, not when its module is loaded."""
+    nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+    bodies = [n.body for n in nodes if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return any(body[0].lineno <= line <= (body[-1].end_lineno or 0) for body in bodies)
+
+
 class Covering:
     """Which tests run a line."""
 
@@ -118,12 +127,13 @@ class Covering:
                 self.seconds[name] = self.seconds.get(name, 0.0) + float(case.get("time") or 0.0)
 
     def tests(self, bug: dict[str, Any]) -> dict[str, float]:
-        """Seconds of the tests that run a bug's line, quickest first; where it is run only when
-        its module is loaded, of those that run anything of the module."""
+        """Seconds of the tests that run a bug's line, quickest first; where it is run when its
+        module is loaded, or as machine code, of those that run anything of the module."""
         lines = self.data.contexts_by_lineno(str(ROOT / bug["file"]))
         own = {function(context) for context in lines.get(bug["line"], ()) if context}
         every = {function(context) for found in lines.values() for context in found}
-        found = {name: self.seconds[name] for name in own or every if name in self.seconds}
+        asked = own if own and in_function(ROOT / bug["file"], bug["line"]) else every
+        found = {name: self.seconds[name] for name in asked if name in self.seconds}
         return dict(sorted(found.items(), key=lambda pair: pair[1]))
 
 
@@ -135,29 +145,39 @@ def main() -> None:
     parser.add_argument("--cover", nargs="*", help="which of these tests runs which line")
     parser.add_argument("--again", action="store_true", help="try those that survived once more")
     parser.add_argument("--only", default="", help="those whose file contains this")
+    parser.add_argument(
+        "--seconds", type=float, default=math.inf, help="of tests a bug, as they took without it"
+    )
     arguments = parser.parse_args()
     if arguments.draw:
-        tried = [bug for bug in listed() if "outcome" in bug]
-        keep(tried + drawn(arguments.draw, arguments.seed, arguments.since))
+        before = [bug if "outcome" in bug else {**bug, "left": True} for bug in listed()]
+        keep(before + drawn(arguments.draw, arguments.seed, arguments.since))
     elif arguments.cover is not None:
         cover(arguments.cover)
     else:
-        study("again" if arguments.again else "outcome", arguments.only)
+        study("again" if arguments.again else "outcome", arguments.only, arguments.seconds)
 
 
-def study(key: str, only: str) -> None:
+def study(key: str, only: str, seconds: float) -> None:
     """Run what was not tried, or what survived, and keep each outcome under the key."""
     bugs, covering = listed(), Covering()
     with tempfile.TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
         for bug in (bug for bug in bugs if only in bug["file"]):
-            if bug.get("outcome") == (None if key == "outcome" else "survived"):
+            wanted = None if key == "outcome" else "survived"
+            if bug.get("outcome") == wanted and bug.get(key) != "killed" and "left" not in bug:
                 begin = time.monotonic()
-                by = noticed_by(bug, covering.tests(bug), copy)
+                by = noticed_by(bug, quickest(covering.tests(bug), seconds), copy)
                 bug |= {key: "killed" if by else "survived", "by": by or ""}
                 bug["seconds"] = round(time.monotonic() - begin, 1)
                 keep(bugs)
                 print(bug[key], bug["seconds"], f"{bug['file']}:{bug['line']}", by, flush=True)
+
+
+def quickest(cost: dict[str, float], seconds: float) -> dict[str, float]:
+    """The first tests that together take no longer."""
+    ends = accumulate(cost.values())
+    return {name: cost[name] for name, end in zip(cost, ends, strict=True) if end <= seconds}
 
 
 def noticed_by(bug: dict[str, Any], cost: dict[str, float], copy: Copy) -> str | None:

@@ -328,3 +328,13 @@ def test_breaks_are_filled_where_the_foot_stays_low() -> None:
 def test_a_contact_is_firm_by_time_or_by_force() -> None:
     assert Span(0.0, LASTS).firm and not Span(0.0, 0.9 * LASTS).firm
     assert Span(0.0, 1e-3, heavy=True).firm and Span(0.1, math.inf).firm
+
+
+def test_where_no_force_is_known_none_makes_a_contact_firm() -> None:
+    """A short touch of a robot however light: its force is taken as nothing."""
+    time = np.arange(0.0, 0.1, 1e-3)
+    height = np.where((time > 0.04) & (time < 0.05), 0.0, 0.1)
+    (span,) = contacts(time, height, PLANNED, weight=1.0)
+    assert not span.heavy and not span.firm
+    (span,) = contacts(time, height, PLANNED, np.full(len(time), 10.0), weight=1.0)
+    assert span.heavy

@@ -1,10 +1,13 @@
 """Foreign columns become ours, as a map says."""
 
+import gc
+import io
 import logging
 import math
+import sys
 import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -281,15 +284,18 @@ def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
 
 def _binary(path: Path) -> Recording:
     """The columns (n,) of numbers or objects of a file that may be damaged."""
-    try:
-        with _silent():
+    raw, reason = None, ""
+    with _silent():
+        try:
             raw = reader(path)(path)
-    except (KembaError, MemoryError):
-        raise
-    except Exception as error:  # what reads the formats of others raises anything on such bytes
-        reason = f"{type(error).__name__}: {error}"[:LONGEST]
-        what = f"is damaged, or no {path.suffix} file of a log: {reason}"
-        raise KembaError(str(path), what) from None
+        except (KembaError, MemoryError):
+            raise
+        except Exception as error:  # readers of others' formats raise anything on such bytes
+            reason = f"{type(error).__name__}: {error}"[:LONGEST]
+        if raw is None:
+            gc.collect()  # closes what the reader has left open, which else is said at the end
+    if raw is None:
+        raise KembaError(str(path), f"is damaged, or no {path.suffix} file of a log: {reason}")
     columns = {name: _cells(values) for name, values in raw.columns.items()}
     first = next(iter(columns), "")
     for name, values in columns.items():
@@ -304,14 +310,16 @@ def _binary(path: Path) -> Recording:
 @contextmanager
 def _silent() -> Iterator[None]:
     """No words of other packages: what they say of a file, its remarks say or its error."""
-    before = logging.root.manager.disable
+    before, hook = logging.root.manager.disable, sys.unraisablehook
     logging.disable(logging.CRITICAL)
+    sys.unraisablehook = lambda _: None
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
             warnings.simplefilter("ignore")
             yield
     finally:
         logging.disable(before)
+        sys.unraisablehook = hook
 
 
 def _cells(values: Any) -> np.ndarray[Any, Any]:

@@ -205,6 +205,19 @@ def test_a_tolerance_of_what_does_nothing_is_found(monkeypatch: pytest.MonkeyPat
     assert "idle has a tolerance" in bad["nominal figures matter"]
 
 
+class OnByDefault(Drag):
+    """Is there where nothing is said of it."""
+
+    c: Annotated[float, Param("N.s.m-1", 5.0, lower=0.0, doc="damping")] = 1.0
+
+
+@pytest.mark.usefixtures("_drag_is_known")
+def test_a_default_that_is_not_off_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(BY_KIND._kinds, "drag", OnByDefault)
+    bad = {result.check.name: result.sentence for result in examine(OnByDefault) if not result.good}
+    assert "its default must be its off value 0" in bad["off is admissible"]
+
+
 @pytest.mark.parametrize("name", BREAKS)
 @pytest.mark.usefixtures("_drag_is_known")
 def test_a_broken_promise_is_found(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

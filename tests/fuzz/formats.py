@@ -64,9 +64,9 @@ def damage(draw: Draw, content: bytes) -> bytes:
 
 
 @st.composite
-def damaged_bytes(draw: Draw) -> str:
-    """Damage to the bytes of a log in any of our formats."""
-    ending = draw(st.sampled_from(ENDINGS))
+def damaged_bytes(draw: Draw, endings: tuple[str, ...] = ENDINGS) -> str:
+    """Damage to the bytes of a log in one of these formats of ours."""
+    ending = draw(st.sampled_from(endings))
     return as_text(ending, damage(draw, whole(ending)))
 
 
@@ -187,6 +187,14 @@ def odd_mcap(draw: Draw) -> str:
     return as_text("mcap", stream.getvalue())
 
 
+ODD = {"npz": odd_npz, "mat": odd_mat, "json": odd_json, "parquet": odd_parquet, "mcap": odd_mcap}
+
+
 def odd_formats() -> st.SearchStrategy[str]:
     """A damaged log in any format but text."""
-    return st.one_of(damaged_bytes(), odd_npz(), odd_mat(), odd_json(), odd_parquet(), odd_mcap())
+    return st.one_of(damaged_bytes(), *(odd() for odd in ODD.values()))
+
+
+def odd_format(ending: str) -> st.SearchStrategy[str]:
+    """A damaged log in this format of ours: its bytes, or its content."""
+    return st.one_of(damaged_bytes((ending,)), ODD[ending]())

@@ -1,11 +1,15 @@
 """A column map whose units do not fit is refused where it is read, before any log."""
 
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from kemba.errors import ConfigErrors
 from kemba.logs.columns import ColumnMap, ColumnSource, check_map
+from kemba.logs.foreign import mapped
+from kemba.logs.recording import Recording
 
 TIME = ColumnSource(source="t")
 
@@ -27,3 +31,13 @@ def test_an_offset_without_unit_is_refused_where_it_could_be_in_either() -> None
     checked(unit="N", offset=2.0)
     with pytest.raises(ConfigErrors, match=r"offset 2 needs a unit: '2 kN' or '2 N'"):
         checked(unit="kN", offset=2.0)
+
+
+def test_times_of_half_the_digits_are_counted_with_all() -> None:
+    """A difference of two times in single precision need not be one of them."""
+    time = np.array([0.1, 0.3, 4000.7], np.float32)
+    columns = {"time [s]": TIME, "piston/F [N]": ColumnSource(source="F")}
+    raw = Recording({"t": time, "F": np.arange(3.0)})
+    found = mapped(raw, ColumnMap(origin="first", columns=columns), Path("log.npz"))
+    assert found.time.tolist() == (time.astype(float) - float(time[0])).tolist()
+    assert found.time[-1] != float(time[-1] - time[0])

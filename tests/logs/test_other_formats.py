@@ -44,7 +44,10 @@ def test_mdf(piece: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     """Two groups at their own rates, units as the file states them, in however many pieces."""
     monkeypatch.setattr("kemba.logs.formats.measured.PIECE", piece)
     log = robot_log()
-    back = read_back(mdf(log, tmp_path / "log.mf4"), tmp_path)
+    units = raw_columns(mdf(log, tmp_path / "log.mf4"), None).units
+    assert units["front_hip_q"] == "deg" and units["rear_hip_tau"] == "Nm"
+    assert "front_piston_x" not in units
+    back = read_back(tmp_path / "log.mf4", tmp_path)
     same(back, log, 1e-6)
     assert np.isfinite(back["body/z"]).sum() == 40 and len(back) == 400
     assert "have a clock of their own" in back.meta["read"][0]
@@ -380,7 +383,7 @@ def test_a_recording_that_breaks_off_is_read_and_told(
     whole = tdms(robot_log(), tmp_path / "log.tdms").read_bytes()
     (tmp_path / "log.tdms").write_bytes(whole[: len(whole) // 2])
     raw = raw_columns(tmp_path / "log.tdms", None)
-    assert raw.remarks == ("it breaks off: its channels end at different times",)
+    assert raw.remarks[0] == "it breaks off: its channels end at different times"
     lengths = {len(raw.columns[name]) for name in raw.clocks}
     assert len(lengths) == 3 and all(
         len(raw.columns[name]) == len(raw.columns[clock]) for name, clock in raw.clocks.items()

@@ -11,6 +11,7 @@ from strange_logs import PLAIN, UNITS, noisy
 from kemba.identify.logs.reading import read_log
 from kemba.logs import load_map
 from kemba.logs.draft.draft import Draft, draft_map
+from kemba.logs.draft.sizes import SIZES, _fits
 
 DEGREES = np.degrees(1)
 
@@ -118,3 +119,9 @@ def test_columns_with_units_and_without_are_read_right_or_asked_about(
     for name in log.names:
         if not any(name in question for question in draft.questions):
             assert back[name] == pytest.approx(log[name], abs=5e-3), name
+
+
+def test_a_hip_turns_by_a_turn_at_most() -> None:
+    """What reads 7 is no angle in rad, and what reads 6.3 may be one."""
+    assert _fits(6.3, "rad", "rad", SIZES["hip/q"])
+    assert not _fits(7.0, "rad", "rad", SIZES["hip/q"]) and _fits(7.0, "deg", "rad", SIZES["hip/q"])

@@ -44,6 +44,18 @@ def test_a_corner_that_is_c_stationary_is_left(start: list[float]) -> None:
     assert found.complementarity <= 1e-12
 
 
+def test_the_residual_is_what_is_left_of_the_gradient() -> None:
+    """Over one and the largest multiplier: of a slope of 3 where nothing holds, all of it; where a
+    bound holds it, nothing."""
+    y = ca.SX.sym("y", 3)
+    bounds = {"lbx": [-1.0, -1.0, 0.0]}
+    program = Mpcc(y, 3.0 * y[2], ca.SX(0, 1), y[0], y[1], bounds, 0.0, None)
+    none, first = np.zeros(program.problem.rows), np.zeros(1, bool)
+    free, held = (multipliers(program, np.array([1.0, 1.0, z]), none, first) for z in (1.0, 0.0))
+    assert free.residual == pytest.approx(3.0)
+    assert held.residual == pytest.approx(0.0) and held.lam_x[2] == pytest.approx(-3.0)
+
+
 def test_a_corner_that_is_the_optimum_is_kept() -> None:
     found = solve((x[0] + 1) ** 2 + (x[1] + 1) ** 2, start=[3.0, 1.0])
     assert found.good and found.stationarity == "strong"

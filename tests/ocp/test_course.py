@@ -1,11 +1,15 @@
 """The course of a start guess: where feet are between their stances."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from kemba.model import Model
 from kemba.ocp import load_task
 from kemba.ocp.reading import asked_of
+from kemba.ocp.relaxation import guess
 from kemba.ocp.relaxation.guess import LIFT, Course, in_order
 from kemba.ocp.task.task import Task
 
@@ -67,3 +71,18 @@ def test_a_foot_stands_where_it_is_asked_to() -> None:
     words = ("start.front/foot/x={at_most: 0.23 m}", "terrain=[{from: 0.235 m, height: -0.2 m}]")
     _, places = foot(*words)
     assert places[0] == pytest.approx([0.23, 0.0], abs=1e-9)
+
+
+def test_the_body_goes_ahead_from_the_end_of_its_first_stance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """To a speed of 1 m/s at the end, evenly: a triangle of speed over 0.5 s."""
+    monkeypatch.setattr(guess, "_from_to", lambda *_: (0.3, 0.0))
+    speed: Any = SimpleNamespace(
+        at=1.0, lower=1.0, upper=1.0, minus=None, location=("end",),
+        quantity=SimpleNamespace(name="body/vx"),
+    )  # fmt: skip
+    t = np.linspace(0.0, 0.7, 701)
+    x = guess._ahead([speed], [(0.0, 0.2), (0.2, 0.5), (0.5, 0.7)], [False, True, True], t)
+    assert x[t <= 0.2] == pytest.approx(0.3)
+    assert x[-1] == pytest.approx(0.3 + 0.25)

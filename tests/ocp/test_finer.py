@@ -1,10 +1,16 @@
 """A plan on many nodes is sought on fewer; its solution starts the finer program."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from kemba.ocp import finer
 from kemba.ocp.certificate.certify import objective
+from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.continue_plan import renoded
+from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
@@ -103,3 +109,26 @@ def test_the_coarser_plan_is_kept_where_a_user_stops_on_many_nodes() -> None:
     found = plan(task, document, tell=lambda text: told.append(str(text)), stop=stop)
     assert found.status == "interrupted" and found.refined and len(found.trajectory) == 101
     assert "interrupted before it was solved on 160 nodes, 100 are kept" in found.sentence
+
+
+@pytest.mark.parametrize(("torque", "said"), [(8.0, False), (13.0, True)])
+def test_a_plan_that_costs_over_thrice_the_earlier_one_is_said_to(
+    torque: float, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """4 before: 8 are twice as many, 13 over three times."""
+    known: Any = SimpleNamespace(
+        missed=(), within=lambda _: True, trajectory="new", ending=Ending.SOLVED, phases=(),
+        sentence="", stages=None, steps=[], size=(1, 1), dear="which is cheaper", name="the run",
+        run="", plan="old", model=None,
+    )  # fmt: skip
+    known.certificate, known.run = known, lambda: known
+    monkeypatch.setattr(finer, "Continuation", lambda *_: known)
+    monkeypatch.setattr(finer, "verdict", lambda *_: (Status.SOLVED, "solved"))
+    monkeypatch.setattr(
+        finer, "costs", lambda _, plan: {finer.TORQUE: 4.0 if plan == "old" else torque}
+    )
+    task = SimpleNamespace(refine="radau", tolerances=None)
+    session = SimpleNamespace(control=None, tell=None, attempts=[])
+    planner: Any = SimpleNamespace(session=session, task=task, model=None, requirements=[])
+    found = finer.continued(planner, known)[0]
+    assert found is not None and ("times the squared torque" in found.sentence) is said

@@ -10,7 +10,7 @@ from kemba.errors import KembaError
 from kemba.identify.published import PAPER_FORCE, PAPER_RISE
 from kemba.mechanism import load_cylinder
 from kemba.model import Model, load_model
-from kemba.plant.characterise import Characteristics, characterise
+from kemba.plant.characterise import Characteristics, characterise, linear
 from kemba.plant.rigs import (
     DynamometerRig,
     LockedRig,
@@ -51,6 +51,15 @@ def first_order() -> Characteristics:
     for rig in rigs:
         logs |= {f"{rig.name}/{k}": v for k, v in logs_of(rig, "planning", noise=True).items()}
     return characterise(logs, CYLINDER)
+
+
+def test_a_line_explains_what_its_distances_from_the_mean_are_not_left() -> None:
+    """R2 of points about y = 100 + x, by hand: 1 - 0.1 / 5.1; a shift of y does not change it."""
+    x = np.array([-1.5, -0.5, 0.5, 1.5])
+    off = 0.158113883 * np.array([1.0, -1.0, -1.0, 1.0])  # sum of squares 0.1, without a slope
+    found, r2 = linear(np.column_stack([np.ones(4), x]), 100.0 + x + off)
+    assert [e.value for e in found] == pytest.approx([100.0, 1.0])
+    assert r2 == pytest.approx(1.0 - 0.1 / 5.1)
 
 
 def test_rise_times_and_dead_time_of_the_truth_come_back() -> None:

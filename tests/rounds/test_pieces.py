@@ -2,8 +2,10 @@
 
 import json
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,8 +17,11 @@ from kemba.model import load_model
 from kemba.model.evidence import write_covariance
 from kemba.model.spec import drawn_models
 from kemba.ocp import load_task
+from kemba.plant.retiming import FALLEN
 from kemba.plotting.source import load_machine
 from kemba.rounds.correction import (
+    TURNED,
+    Aim,
     Correction,
     CorrectionSettings,
     FlownJump,
@@ -251,6 +256,28 @@ def test_scatter_counts_what_is_usual_once() -> None:
     assert scatter_of(flights([0.0])) == pytest.approx(usual)
     assert scatter_of(flights([0.001, -0.001, 0.0])) < usual
     assert scatter_of(flights([0.02, -0.02, 0.0])) > 2.0 * usual
+
+
+@pytest.mark.parametrize(
+    ("flown", "lands", "moved", "error"),
+    [
+        (FlownJump(0.5, 0.3, 0.0), True, 0, 0.0),
+        (FlownJump(0.501, 0.3, 0.0), True, 8, 2.0),
+        (FlownJump(0.5, 0.3, 0.0), True, 9, FALLEN),
+        (FlownJump(0.5, 0.3, 0.0), False, 0, FALLEN),
+        (FlownJump(0.5, inf, 0.0), True, 0, FALLEN),
+        (FlownJump(0.501, 0.3, 0.02), True, 0, 2.0 + TURNED),
+    ],
+)
+def test_a_corrected_table_that_falls_or_is_far_is_none(
+    flown: FlownJump, lands: bool, moved: int, error: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The apex counts in half millimetres; one that must land and does not has fallen."""
+    monkeypatch.setattr("kemba.rounds.correction._moved", lambda *_: {"edge": [-moved]})
+    aim: Any = SimpleNamespace(expected=lambda *_: (flown, lands))
+    table, wanted = Trajectory(np.arange(2.0), {}), FlownJump(0.5, 0.3, 0.0)
+    found = Aim._tried(aim, table, table, 0.0, wanted, turn=0.01, must=True)
+    assert found.error == pytest.approx(error)
 
 
 def test_earlier_logs_that_are_gone_or_changed_are_said(tmp_path: Path) -> None:

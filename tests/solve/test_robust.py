@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +14,7 @@ from kemba.ocp.planning import plan
 from kemba.scenarios.draw import Scenario, scenarios
 from kemba.scenarios.share import ScenarioOutcome, outcomes
 from kemba.solve.judged import plant_of
-from kemba.solve.robust import gripping, least_grip, lifted, longer, most_robust
+from kemba.solve.robust import _Search, gripping, least_grip, lifted, longer, most_robust
 
 
 @cache
@@ -139,3 +140,12 @@ def test_after_the_deadline_nothing_more_is_tried(
     task = asked(0.84, 6, tmp_path / "slippery.yaml")
     found = most_robust(task, late, change, lambda text: None, deadline=10.0)
     assert found.share is None and len(solved) == 1 and not changed
+
+
+@pytest.mark.parametrize("status", [Status.INTERRUPTED, Status.LIMIT])
+def test_what_is_no_plan_is_not_executed(status: Status) -> None:
+    """After an interruption nothing else is tried; after a failure other plans are."""
+    nothing: Any = SimpleNamespace(status=status)
+    search = _Search(nothing, [], print, deadline=0.0)
+    search.take("none", nothing)
+    assert search.candidates == [] and search.done is (status is Status.INTERRUPTED)

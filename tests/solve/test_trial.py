@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kemba.ocp.certificate.status import Status
+from kemba.solve import trial as modules
 from kemba.solve.trial import Motions, Trial
 
 
@@ -29,3 +30,29 @@ def trial(status: Status, share: float, cost: float, replays: bool = False) -> T
 )
 def test_of_two_trials_the_better_is_given(better: Trial, worse: Trial) -> None:
     assert max([worse, better], key=lambda one: one.score) is better
+
+
+@pytest.mark.parametrize(
+    ("lags", "replays", "good", "said"),
+    [(True, True, False, True), (True, False, False, False), (False, True, False, False),
+     (True, True, True, False)],
+)  # fmt: skip
+def test_first_order_air_is_blamed_where_the_plan_is_right_and_falls(
+    lags: bool, replays: bool, good: bool, said: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a plant of physical chambers, of a plan that is true on its own model."""
+    silent = {"another_robot": None, "lacking": [], "carried_over": [], "sentence_of": "done"}
+    for name, value in silent.items():
+        monkeypatch.setattr(modules, name, lambda *_, value=value: value)
+    monkeypatch.setattr(modules, "with_lags", lambda _: None if lags else object())
+    monkeypatch.setattr(modules, "load_spec", lambda _: SimpleNamespace(chambers="orifice"))
+    monkeypatch.setattr(
+        modules, "_unconfirmed", lambda found, why, names: {"sentence": "; ".join([why, *names])}
+    )
+    task = SimpleNamespace(model="planning", plant="full", payload=0.0)
+    plan: Any = SimpleNamespace(task=task, model=None)
+    done: Any = SimpleNamespace(
+        replays=replays, good=good, truth=SimpleNamespace(on="full"), band=None, feedback=None,
+        remarks=[], causes=["it falls"],
+    )  # fmt: skip
+    assert (modules.AIR in modules._confirmed(plan, done)["sentence"]) is said

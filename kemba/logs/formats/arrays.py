@@ -247,12 +247,18 @@ def read_mat(path: Path) -> Recording:
                 error.where, what, "a timeseries, or a vector a column", WAY_OUT
             ) from None
     groups: dict[int, Raw] = {}
+    other = list[str]()
     for name, time, values in index["series"]:
         parts = _parts(name, arrays[f"a{values}"], len(arrays[f"a{time}"]))
         groups.setdefault(time, {}).update(parts)
+        other += [] if parts else [name]
     found = [Group("", arrays[f"a{time}"], "s", columns) for time, columns in groups.items()]
     left = [name for name, array in loose.items() if array.dtype.kind in "fiub" and array.ndim == 1]
     said = [f"left out, since they have no times: {', '.join(left[:6])}"] if left else []
+    if other:
+        said.append(f"left out, since they are not as long as their times: {', '.join(other[:6])}")
+    if index["unread"]:
+        said.append(f"{index['unread']} objects cannot be read: damaged, or of a newer MATLAB")
     return recording(found, said)
 
 

@@ -30,6 +30,7 @@ class Found:
         self.series: list[tuple[str, np.ndarray, np.ndarray]] = []
         self.loose: dict[str, np.ndarray] = {}
         self.classes: list[str] = []
+        self.unread: set[int] = set()  # objects without properties, by identity
 
     def walk(self, path: str, value: Any, depth: int = 0, named: bool = True) -> None:
         """Everything in a value that is a series or an array; `named`: the path is its own."""
@@ -68,7 +69,10 @@ class Found:
             self.classes.append(str(value.classname))
             if isinstance(properties, dict):
                 return properties
-            return self.fields(properties) if isinstance(properties, np.ndarray) else {}
+            found = self.fields(properties) if isinstance(properties, np.ndarray) else None
+            if found is None:
+                self.unread.add(id(value))
+            return found or {}
         return None
 
     def struct(self, path: str, fields: dict[str, Any], depth: int, own: bool) -> None:
@@ -238,6 +242,7 @@ def main() -> int:
     arrays: list[np.ndarray] = []
     times: list[int] = []
     index: dict[str, Any] = {"series": [], "loose": [], "classes": sorted(set(found.classes))}
+    index["unread"] = len(found.unread)
     for name, time, values in found.series:
         at = next((i for i in times if np.array_equal(arrays[i], time)), None)
         if at is None:

@@ -1,6 +1,8 @@
 """Logs of data loggers: MDF (asammdf), TDMS (nptdms), ULog (pyulog); channels keep their clocks."""
 
+import sys
 from collections.abc import Iterator
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,8 @@ from kemba.errors import KembaError
 from kemba.logs.formats import check_size
 from kemba.logs.recording import TIME_WORD, Column, Group, Raw, Recording, free, recording, shared
 
+ULOG_HEAD = 16  # bytes before the first message of a ULog, by its specification
+ULOG_TYPES = b"ABCDFILMOPQRS"  # of its messages, by its specification
 PIECE = 20_000  # rows of a group that are read at once
 
 
@@ -18,15 +22,17 @@ def read_mf4(path: Path) -> Recording:
     from asammdf import MDF
 
     check_size(path, path.stat().st_size)
+    said: list[str] = []
     with MDF(path) as file:
-        groups = [_mdf_group(file, number) for number in range(len(file.groups))]
-    return _named(path, [group for group in groups if group is not None])
+        groups = [_mdf_group(file, number, said) for number in range(len(file.groups))]
+    return _named(path, [group for group in groups if group is not None], said)
 
 
-def _mdf_group(file: Any, number: int) -> Group | None:
+def _mdf_group(file: Any, number: int, said: list[str]) -> Group | None:
     """The channels of numbers of one group, read in pieces: asammdf needs thrice their size."""
     group = file.groups[number]
-    master, rows, read = file.masters_db.get(number), int(group.channel_group.cycles_nr), 0
+    master, stated, read = file.masters_db.get(number), int(group.channel_group.cycles_nr), 0
+    rows = min(stated, _rows_there(group))
     clock = group.channels[master].name if master is not None else None
     wanted = [(None, number, i) for i in range(len(group.channels))]
     table: dict[int, Column] = {}
@@ -35,7 +41,7 @@ def _mdf_group(file: Any, number: int) -> Group | None:
         signals = file.select(
             wanted,
             record_offset=begin,
-            record_count=PIECE,
+            record_count=min(PIECE, rows - begin),
             copy_master=False,
             ignore_value2text_conversions=True,  # a valve is 0 or 1, not a text
         )
@@ -49,6 +55,8 @@ def _mdf_group(file: Any, number: int) -> Group | None:
             time[begin:read] = signal.timestamps
         if read < begin + PIECE:
             break  # the last piece, or a file that was cut off
+    if read < stated and table:
+        said.append(f"it breaks off: {read} of {stated} readings of a group are there")
     columns: Raw = {}
     units: dict[str, str] = {}
     for i, values in table.items():
@@ -59,6 +67,14 @@ def _mdf_group(file: Any, number: int) -> Group | None:
     return Group("", time[:read], "s", columns, units) if read else None
 
 
+def _rows_there(group: Any) -> int:
+    """For how many rows the data of a group suffice; of rows beyond them asammdf makes readings
+    up. A group that shares its data with others may have fewer."""
+    sizes = [block.original_size for block in group.get_data_blocks()]
+    size = int(group.channel_group.samples_byte_nr)
+    return sum(sizes) // size if size and None not in sizes else sys.maxsize
+
+
 def read_tdms(path: Path) -> Recording:
     """National Instruments' TDMS: the clock of a waveform is its start, offset and increment; of
     channels without one, a channel of the group that is called a time."""
@@ -67,9 +83,14 @@ def read_tdms(path: Path) -> Recording:
     groups: list[Group] = []
     said: list[str] = []
     with TdmsFile.open(path) as file:
-        if file.file_status.incomplete_final_segment:
+        state = file.file_status
+        if state.incomplete_final_segment or state.channel_statuses is not None:
             said.append("it breaks off: its channels end at different times")
-        channels = [c for group in file.groups() for c in group.channels() if len(c)]
+        every = [c for group in file.groups() for c in group.channels()]
+        channels = [c for c in every if len(c)]
+        if empty := [c.name for c in every if not len(c)]:
+            more = " and more" if len(empty) > 6 else ""
+            said.append(f"without any reading: {', '.join(empty[:6])}{more}")
         check_size(path, sum(8 * len(channel) for channel in channels))
         starts = [
             c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties
@@ -138,7 +159,19 @@ def read_ulg(path: Path) -> Recording:
         stamps = np.asarray(data.data["timestamp"], dtype=np.int64)
         groups.append(Group(name, stamps, "us", columns))
     said = [f"{len(file.dropouts)} dropouts"] if file.dropouts else []
+    if file.file_corruption or not (file.has_data_appended or _whole(path)):
+        said.append("it is damaged or breaks off: what is left is read")
     return _named(path, [g for g in groups if g.columns and len(g.time) > 1], said, together=False)
+
+
+def _whole(path: Path) -> bool:
+    """Whether the messages of a ULog, each with its length and its type before it, are known ones
+    and end where the file ends: pyulog leaves out what is not, without a word."""
+    with path.open("rb") as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as data:
+        at, end = ULOG_HEAD, len(data)
+        while at + 3 <= end and data[at + 2] in ULOG_TYPES:
+            at += 3 + data[at] + 256 * data[at + 1]
+    return at == end
 
 
 def _named(

@@ -24,7 +24,7 @@ def write_parquet(trajectory: Trajectory, path: Path) -> None:
     table = pa.table(dict(zip(headers, values, strict=True)))
     meta = {META: json.dumps(plain(trajectory.meta)).encode()}
     with atomic_path(path) as temporary:
-        pq.write_table(table.replace_schema_metadata(meta), temporary)
+        pq.write_table(table.replace_schema_metadata(meta), temporary, write_page_checksum=True)
 
 
 def read_parquet(path: Path) -> Recording:
@@ -34,7 +34,7 @@ def read_parquet(path: Path) -> Recording:
         with pq.ParquetFile(path) as file:
             found = file.metadata
         check_size(path, 8 * found.num_rows * found.num_columns)
-        table = pq.read_table(path)
+        table = pq.read_table(path, page_checksum_verification=True)
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     except pa.ArrowException as error:

@@ -50,18 +50,23 @@ def _take(file: Path, topics: dict[str, Topic], said: list[str]) -> None:
     address = f"file:{file.resolve().as_posix()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(address, uri=True)) as base:
         schemas = _schemas(base)
-        known: dict[int, Topic] = {}
+        known: dict[int, Topic | None] = {}
+        lost = 0
         query = "SELECT id, name, type, serialization_format FROM topics"
         for number, name, kind, encoding in base.execute(query):
             decode = _decode(encoding, kind, schemas)
             if decode is None:
                 said.append(f"topic {name} is not read: its messages are {encoding} of {kind}")
+                known[number] = None
                 continue
             known[number] = topics.setdefault(name, Topic(name, decode))
         query = "SELECT topic_id, timestamp, data FROM messages"
         for number, stamp, data in base.execute(query):
-            if number in known:
-                known[number].add(stamp, known[number].decode(data))
+            if (topic := known.get(number)) is not None:
+                topic.add(stamp, topic.decode(data))
+            lost += number not in known
+        if lost:
+            said.append(f"it is damaged: {lost} messages are of topics that it does not list")
 
 
 def _schemas(base: sqlite3.Connection) -> dict[str, tuple[str, str]]:

@@ -2,6 +2,8 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -12,7 +14,15 @@ from twin.scripts import from_table
 
 from kemba.config import Document
 from kemba.errors import KembaError
-from kemba.identify.design.robot import Sway, SwaySettings, controller, propose_motion, safe, task
+from kemba.identify.design.robot import (
+    MotionProposal,
+    Sway,
+    SwaySettings,
+    controller,
+    propose_motion,
+    safe,
+    task,
+)
 from kemba.identify.design.separation import Rivals
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import robot_problem
@@ -72,3 +82,19 @@ def test_the_twin_agrees_on_a_hip(tmp_path: Path) -> None:
     problem = robot_problem(read_logs(paths), load_model())
     rivals: Rivals = found.rivals
     assert measured_evidence(problem, rivals, "hip_friction", "hip_damping") > 5.0
+
+
+def test_the_evidence_of_a_run_is_that_of_rows_as_were_designed_for() -> None:
+    """500 rows per second, as of the proposals that it is compared with."""
+    proposal: Any = SimpleNamespace(model="model", rivals="rivals")
+    asked = {}
+
+    def done(run: str, model: str, **named: float) -> Any:
+        asked.update(named)
+        return SimpleNamespace(trajectory=run)
+
+    where = "kemba.identify.design.robot"
+    least = SimpleNamespace(least=3.0)
+    with patch(f"{where}.execute", done), patch(f"{where}.expected", lambda *_: least):
+        assert MotionProposal.nats_of(proposal, "run") == 3.0
+    assert asked == {"sample": 1.0 / SwaySettings.rows}

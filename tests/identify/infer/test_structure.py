@@ -14,7 +14,8 @@ from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.identify.adopt import write_model
 from kemba.identify.answer import Answer, Ranked, Value
 from kemba.identify.discover import discover
-from kemba.identify.infer.structure import is_mixture, joined
+from kemba.identify.infer.structure import _verdict, is_mixture, joined
+from kemba.identify.infer.windows import excess
 from kemba.identify.problem.candidates import by_default
 from kemba.identify.problem.structure import ORIFICE, structure_candidates
 from kemba.identify.robot.problem import robot_problem
@@ -143,3 +144,15 @@ def test_a_share_of_another_structure_is_no_whole_answer(
 ) -> None:
     """The model that is written has the structure whole: 0.78 of it land elsewhere."""
     assert is_mixture(Value((low + high) / 2, low, high, "1")) == mixed
+
+
+def test_half_of_an_unexplained_error_is_a_part_of_an_answer() -> None:
+    """Where the second search does not know, half of the error beyond the noise; else a tenth."""
+    before = 5.0
+    for second, share, verdict in (
+        ("unknown", 0.49, "partly"), ("unknown", 0.52, "unknown"),
+        ("partly", 0.89, "partly"), ("partly", 0.92, "unknown"),
+        ("missing", 0.19, "missing"), ("missing", 0.49, "partly"),
+    ):  # fmt: skip
+        after = float(np.hypot(1.0, share * excess(before)))
+        assert _verdict(second, before, after) == verdict, (second, share)

@@ -1,6 +1,8 @@
 """Lengths found from feet that stand, and named by `discover`, before any force is blamed."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from kemba.effects.mechanics.geometry import Geometry
 from kemba.identify.adopt import item
 from kemba.identify.discover import discover
 from kemba.identify.logs.gate import BadData
+from kemba.identify.robot import geometry
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.mechanism import robot_mechanism
 from kemba.model import Model, load_model
@@ -110,3 +113,15 @@ def test_it_is_written_as_a_model_reads_it() -> None:
     row = item("geometry:tibia/length", {"d": {"value": 0.02}})
     spec = ModelSpec.model_validate({"base": "planning", "effects": [row]})
     assert spec.effects[0] == Geometry(part="tibia/length", d=0.02)
+
+
+def test_each_zero_is_in_doubt_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three lengths, then zeros of the pitch, the height, two hips and two pistons."""
+    standing: Any = SimpleNamespace(names=("a", "b", "c"), legs=2)
+    width = np.full(9, 1e-4)
+    monkeypatch.setattr(
+        geometry, "_only", lambda standing, free, x, loose, rows: (0, loose / width > 1.5, 0)
+    )
+    x, rows = np.zeros(9), np.zeros(0, bool)
+    wide = [np.flatnonzero(cost).tolist() for cost in geometry._drawn(standing, x, width, rows)]
+    assert wide == [[], [4], [3], [5, 6], [7, 8]]

@@ -1,5 +1,7 @@
 """Robot residuals: white where the model is right, sharp where an effect is missing."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from robot_logs import hops
 from twin import catalogue, measure
 
 from kemba.identify.problem.problem import Problem
-from kemba.identify.robot.problem import RobotProblem, robot_problem
+from kemba.identify.robot.noise import predicted_error
+from kemba.identify.robot.problem import PREDICTED, RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -152,3 +155,20 @@ def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> N
         )
         assert few_force == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
     assert len(physics.states_at(physics.nominal)) < physics.states.count
+
+
+def test_short_predictions_take_the_time_that_they_are_said_to(
+    clean: RobotProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of rows of 1 ms, as many as milliseconds; the model is right, and so is what it predicts."""
+    asked = list[int]()
+
+    def told(system: Any, y: Any, g: Any, steps: int) -> Any:
+        asked.append(steps)
+        return predicted_error(system, y, g, steps)
+
+    monkeypatch.setattr("kemba.identify.robot.problem.predicted_error", told)
+    errors = clean.window_errors({})
+    row = float(np.median(clean.batch.h[clean.batch.valid]))
+    assert asked == [round(PREDICTED / row)] and asked[0] > 2
+    assert set(errors) == set(clean.physics.channels)

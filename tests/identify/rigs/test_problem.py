@@ -1,0 +1,40 @@
+"""What a rig's model lacks, and the period of a cogging axis, are read from numbers that are
+known."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from kemba.identify.rigs.problem import RigProblem, _strongest_period
+
+
+def test_what_a_model_lacks_is_noise_of_all_rows() -> None:
+    """Gaps of 3 N to both sides beside 1 N of the sensors: 8 N2 more, whatever their sign."""
+    gap = np.array([3.0, -3.0, 3.0, -3.0])
+    predictor = SimpleNamespace(
+        gap=lambda log, theta: gap, variance=lambda log, usual: np.ones(len(gap))
+    )
+    coarse = SimpleNamespace()
+    problem: Any = SimpleNamespace(
+        logs=[None], usual=1.0, predictor=predictor, recolour=lambda _: coarse
+    )
+    assert RigProblem.coarser(problem, {}) is coarse
+    assert coarse._sigma[0] == pytest.approx(np.full(4, 3.0))
+
+
+@pytest.mark.parametrize("phase", [0.4, 2.5, 4.0])
+def test_the_strongest_period_has_its_phase(phase: float) -> None:
+    """A sine of the position, beside inertia, friction and an offset."""
+    t = np.linspace(0.0, 20.0, 4000)
+    q, v, a = np.sin(t), np.cos(t), -np.sin(t)
+    wave = 2.0 * np.sin(2 * np.pi * q / 0.1 + phase)
+    force = wave + 3.0 * a + 0.5 * v + 4.0 * np.sign(v) + 1.0
+    channels = SimpleNamespace(q=q, v=v, a=a, rows=slice(None))
+    log: Any = SimpleNamespace(channels=channels, doubt=np.zeros(len(t)))
+    predictor: Any = SimpleNamespace(gap=lambda log, theta: -force)
+    period, found = _strongest_period(predictor, (log,))
+    assert period == pytest.approx(0.1, rel=0.03)
+    # the period is one of a grid: over the travel from -1 to 1 its phase is off where q is not 0
+    assert found == pytest.approx(phase, abs=0.2)
