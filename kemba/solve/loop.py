@@ -2,7 +2,7 @@
 
 for each start:                     an earlier plan, one guess after the other
     plan from it                    kemba.ocp.planning
-    for each repair:                nothing, edges on ticks
+    for each repair:                nothing, more stages an element, edges on ticks
         execute and judge           kemba.solve.trial
     stop if the best trial is good
 give the trial of the best score; where the plant keeps to none, the best that it keeps to with
@@ -39,27 +39,40 @@ class Listener:
 
 
 TICKS = "valve edges on the ticks of the controller"
+STAGES = "five stages in every element"
 
 
 def repaired(first: Trial, planning: Planning, execution: TrialOrder) -> Iterator[Trial]:
-    """The trial, and that with valve edges on ticks where only its table misses, or nearly does, on
-    the plan's own model. A plan that was not refined, or whose time is over, is not repaired."""
+    """The trial; that with more stages an element where its inputs miss on the plan's own model,
+    which errors of integration let a sensitive motion do; and that with valve edges on ticks where
+    only its table misses there, or nearly does. A plan that was not refined, or whose time is over,
+    is not repaired."""
     yield first
     if first.fine or planning.over or not first.judged or not first.plan.refined:
         return
-    if first.good or first.table_misses:
+    if first.inputs_miss:
+        execution.tell(STAGES)
+        finer = _again(first.plan, planning, "the same plan with fewer stages", finer=True)
+        if finer is None:
+            return
+        first = executed(finer, execution, repair=STAGES)
+        yield first
+    if not first.fine and (first.good or first.table_misses):
         execution.tell(TICKS)
-        near = _on_ticks(first.plan, planning)
+        name = "the same plan with edges between ticks"
+        near = _again(first.plan, planning, name, ticks=True)
         if near is not None:
             yield executed(near, execution, repair=TICKS)
 
 
-def _on_ticks(old: Plan, planning: Planning) -> Plan | None:
-    """The plan with its valve edges on ticks; None where that fails in one step, or where it costs
-    so much more that another guess is likely to cost less."""
+def _again(
+    old: Plan, planning: Planning, name: str, ticks: bool = False, finer: bool = False
+) -> Plan | None:
+    """The plan with its valve edges on `ticks`, or with `finer` elements; None where that fails in
+    one step, or where it costs so much more that another guess is likely to cost less."""
     known = old.trajectory, old.model, old.requirements
-    name = "the earlier plan" if old.continued else "the same plan with edges between ticks"
-    origin = Origin(*known, name, once=True, ticks=True, stages=old.stages)
+    name = "the earlier plan" if old.continued else name
+    origin = Origin(*known, name, once=True, ticks=ticks, finer=finer, stages=old.stages)
     near, _ = planning.continued(origin)
     if near is None or near.status is not Status.SOLVED or dear(near, old.objective):
         return None

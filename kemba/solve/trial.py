@@ -22,6 +22,7 @@ AIR = (
     "the simulated robot has physical chambers, and this plan has first-order ones: plan with "
     "--model orifice on the shipped robot, with `chambers: orifice` in the model of another"
 )
+MOST = 5  # stages of an element
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
@@ -68,6 +69,13 @@ class Trial:
     def good(self) -> bool:
         """Whether it is solved and its executions confirm it."""
         return bool(self.result["good"])
+
+    @property
+    def inputs_miss(self) -> bool:
+        """Whether its inputs miss on its own model, and its elements have few stages."""
+        done, stages = self.judged, self.plan.stages
+        few = stages is not None and stages.stages < MOST
+        return few and done is not None and not done.verdicts["replay"].good
 
     @property
     def table_misses(self) -> bool:

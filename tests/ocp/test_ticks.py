@@ -1,5 +1,7 @@
 """Valve edges of a plan on the controller's ticks: its table then is the plan."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from kemba.ocp.planned import Plan
 from kemba.ocp.planning import Planning
 from kemba.ocp.reading import load_task
 from kemba.ocp.transcription.symmetry import find_symmetry, whole
+from kemba.plant.replay import replay
 
 
 def off_ticks(model: Model, plan: Plan) -> float:
@@ -41,6 +44,26 @@ def test_a_plan_on_ticks_has_its_edges_there() -> None:
     assert off_ticks(new.model, new) < 1e-8
     cost = [plan.cost["torque_squared_integral"] for plan in (old, new)]
     assert cost[1] == pytest.approx(cost[0], rel=0.05)
+
+
+def test_the_same_plan_with_five_stages_an_element_executes_more_exactly() -> None:
+    """Its own stages then begin what is solved from it."""
+    task, document = load_task("jump_forward.yaml", ["nodes=60"])
+    planning = Planning.of(task, document)
+    plans = [next(planning.plans())]
+    for how in ({"finer": True}, {"ticks": True}):
+        last = plans[-1]
+        known = last.trajectory, last.model, last.requirements
+        found, why = planning.continued(
+            replace(Origin(*known, once=True, stages=last.stages), **how)
+        )
+        assert found is not None, why
+        plans.append(found)
+    assert [p.stages.stages for p in plans if p.stages] == [3, 5, 5]
+    assert off_ticks(plans[2].model, plans[2]) < 1e-8
+    errors = [replay(p.model, p.trajectory).final_error_m for p in plans[:2]]
+    assert errors[1] < 0.5 * errors[0]
+    assert plans[1].objective == pytest.approx(plans[0].objective, rel=0.02)
 
 
 @pytest.mark.parametrize("half", [True, False])

@@ -24,7 +24,7 @@ from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.radau import RADAU5
+from kemba.ocp.phases.radau import RADAU5, RADAU9
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.refine import Refined, Refiner, read, reduction_of, refine, valve_columns
@@ -93,7 +93,7 @@ class Continuation:
                 found = self._solved(mesh, reduction)
                 if found.ending.cut_short or self._is_kept(found):
                     return found
-                if self.origin.ticks:
+                if self.origin.ticks or self.origin.finer:
                     break
             if self.origin.once:
                 return Refined(None, None, Ending.GAVE_UP, 0)
@@ -142,13 +142,17 @@ class Continuation:
         refiner = Refiner(
             self.model, self.task, self.requirements, mesh.start, reduction, self.control
         )
-        program, x = refiner.build(mesh.phases, mesh.start, RADAU5)
+        five = mesh.stages is not None and mesh.stages.stages == RADAU9.stages
+        program, x = refiner.build(mesh.phases, mesh.start, RADAU9 if five else RADAU5)
         kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
+        if self.origin.finer and kept is not None:
+            program, kept = refiner.carried(RADAU9, program, kept)
         x = with_impacts(program, x, Continuing.ease) if kept is None else kept
         if self.origin.ticks:
             on_ticks(program, x)
         begin = Iterate(x)
-        if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
+        same = mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases)
+        if same and not self.origin.finer and mesh.stages is not None:
             begin = mesh.stages.iterate(program, x)
         options = warm(min(Continuing.iterations, self.task.solver.max_iterations))
         mu = ipopt.last_barrier(Refining.tol)

@@ -24,7 +24,8 @@ class Origin:
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
     where the earlier phases do not fit, they are not read anew. `ticks`: valve edges of the new
     plan are on the controller's ticks; where that fails at once, these ticks do not fit, and
-    nothing else is tried. `stages`: the solved program of the plan, where it is at hand. `run`: its
+    nothing else is tried. `finer`: five stages an
+    element. `stages`: the solved program of the plan, where it is at hand. `run`: its
     folder; `given`: whether the user named it.
     """
 
@@ -35,6 +36,7 @@ class Origin:
     dear: str = "one without --from may take less"
     once: bool = False
     ticks: bool = False
+    finer: bool = False
     stages: Stages | None = None
     run: str = ""
     given: bool = True

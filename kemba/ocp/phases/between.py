@@ -34,9 +34,9 @@ class Along:
     allowed: float
 
 
-def add_missed(program: PhaseProgram, x: np.ndarray) -> bool:
+def add_missed(program: PhaseProgram, x: np.ndarray, within: float = 0.0) -> bool:
     """Add rows at the places between nodes where the solution x (size,) misses what holds along the
-    motion; whether there were any."""
+    motion, or keeps to it by less than `within` [m]; whether there were any."""
     view, c, added = View(program), program.columns, False
     for asked in list(_along(program, view)):
         for share in SHARES:
@@ -46,7 +46,7 @@ def add_missed(program: PhaseProgram, x: np.ndarray) -> bool:
             f = ca.Function("g", [z], [ca.densify(g)])
             values = np.array(f.map(len(columns))(x[columns].T)).ravel()
             over = np.maximum(asked.low - values, values - asked.high)
-            there = list(columns[over > HALF * asked.allowed])
+            there = list(columns[over > HALF * asked.allowed - within / SCALES["m"]])
             program.add(f"{asked.label} between", z, g, asked.low, asked.high, there)
             added |= bool(there)
     return added

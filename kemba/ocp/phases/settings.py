@@ -60,6 +60,9 @@ class Refining:
     # the same of elastic solves; where it is large beside the price, modes that can hold are
     # violated
     near_elastic = 0.01
+    # m; a foot this near to what it keeps off between nodes cuts its corner without a row there (a
+    # hurdle of 0.2 m with five stages an element: by 36 mm, and no solution with rows added after)
+    near_rows = 5e-3
     mu = 1e-4  # barrier parameter of a warm start
     elastic_mu = 0.1  # barrier parameter of an elastic solve: IPOPT's default
     push = 1e-6  # distance from the bounds of a warm start: small beside every scaled variable

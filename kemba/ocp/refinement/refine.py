@@ -13,6 +13,7 @@ from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.mode_constraints import (
     ContradictionError,
     Independent,
@@ -268,10 +269,21 @@ class Refiner:
         self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
     ) -> tuple[tuple[PhaseProgram, Iterate], Refined]:
         """The exact program with a scheme, solved from a solution `x` (size,) of another one."""
-        program, _ = self.build(other.phases, self.plan, scheme)
-        start = carried(program, other.columns, other.scheme.points, x)
+        program, start = self.carried(scheme, other, x)
         found = self._solve(program, start, warm(Refining.rough_iterations))
         return (program, found), read(program, found)
+
+    def carried(
+        self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
+    ) -> tuple[PhaseProgram, np.ndarray]:
+        """The exact program with a scheme and its start (size,), from a solution of another one;
+        with rows between nodes where that was solved along the motion and is near to what it is to
+        keep off."""
+        program, _ = self.build(other.phases, self.plan, scheme)
+        start = carried(program, other.columns, other.scheme.points, x)
+        if other.scheme is not RADAU3:
+            add_missed(program, start, Refining.near_rows)
+        return program, start
 
     def _keeps(self, found: Refined) -> bool:
         """Whether a plan keeps to all that its certificate measures."""
