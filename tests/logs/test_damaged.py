@@ -110,6 +110,11 @@ def test_a_group_of_mdf_that_is_shorter_than_it_says(tmp_path: Path) -> None:
     found = raw_columns(file, None)
     assert found.remarks == ("it breaks off: 40 of 50 readings of a group are there",)
     assert len(found.columns["time"]) == 40
+    at = content.index(b"##DT")
+    file.write_bytes(content[:at] + bytes(4) + content[at + 4 :])
+    found = raw_columns(file, None)
+    assert found.remarks == ("it breaks off: 0 of 4 readings of a group are there",)
+    assert "body_x" not in found.columns
 
 
 def test_of_a_damaged_file_nothing_else_is_printed(

@@ -55,7 +55,7 @@ def _mdf_group(file: Any, number: int, said: list[str]) -> Group | None:
             time[begin:read] = signal.timestamps
         if read < begin + PIECE:
             break  # the last piece, or a file that was cut off
-    if read < stated and table:
+    if read < stated and (table or not rows):
         said.append(f"it breaks off: {read} of {stated} readings of a group are there")
     columns: Raw = {}
     units: dict[str, str] = {}
