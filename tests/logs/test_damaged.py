@@ -101,6 +101,17 @@ def test_channels_without_readings(tmp_path: Path) -> None:
     )
 
 
+def test_data_of_tdms_that_are_of_no_channel(tmp_path: Path) -> None:
+    """Under a name in which the marks between group and channel are damaged."""
+    file = tdms(robot_log(40), tmp_path / "log.tdms", "Time")
+    content = file.read_bytes()
+    assert content.count(b"/'log'/'rear_hip_q'") == 1
+    file.write_bytes(content.replace(b"/'log'/'rear_hip_q'", b"/'log___rear_hip_q'"))
+    found = raw_columns(file, None)
+    assert "rear_hip_q" not in found.columns
+    assert found.remarks[0] == "it is damaged: 1 objects with data are no channels"
+
+
 def test_a_group_of_mdf_that_is_shorter_than_it_says(tmp_path: Path) -> None:
     file = mdf(robot_log(40), tmp_path / "log.mf4")
     content = file.read_bytes()
