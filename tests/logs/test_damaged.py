@@ -164,6 +164,17 @@ def test_objects_of_matlab_that_cannot_be_read(
     )
 
 
+def test_vectors_without_entries_are_no_log(tmp_path: Path) -> None:
+    """SciPy takes a damaged head for an old version, and reads one odd variable."""
+    np.savez(tmp_path / "log.npz", time=np.zeros(0), x=np.zeros(0))
+    with pytest.raises(KembaError, match="holds no vector of numbers: 'time' of shape"):
+        raw_columns(tmp_path / "log.npz", None)
+    file = logs_out(robot_log(40), tmp_path / "log.mat")
+    file.write_bytes(bytes(16) + file.read_bytes()[16:300])
+    with pytest.raises(KembaError, match=r"log\.mat"):
+        raw_columns(file, None)
+
+
 def test_a_changed_byte_in_our_parquet_is_known(tmp_path: Path) -> None:
     """Pages have checksums; a changed reading would else be read."""
     file = export(robot_log(), tmp_path / "log.parquet")
