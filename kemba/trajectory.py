@@ -93,9 +93,7 @@ def _numbers(stream: TextIO, width: int) -> Table:
     first = next(rows, None)
     if first is None:
         return np.empty((0, width))
-    table = np.loadtxt(
-        chain([first], rows), delimiter=",", ndmin=2, comments=None, quotechar='"', dtype=float
-    )
+    table = np.loadtxt(chain([first], rows), delimiter=",", ndmin=2, comments=None, quotechar='"')
     if table.shape[1] != width:
         raise ValueError(f"{table.shape[1]} columns below {width} headers")
     return table

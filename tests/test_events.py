@@ -338,3 +338,16 @@ def test_where_no_force_is_known_none_makes_a_contact_firm() -> None:
     assert not span.heavy and not span.firm
     (span,) = contacts(time, height, PLANNED, np.full(len(time), 10.0), weight=1.0)
     assert span.heavy
+
+
+@pytest.mark.parametrize(
+    ("speed", "rear", "legs"),
+    [([0.0, 2.0, 0.0], 0.0, ["front", "rear"]), ([0.0, 2.0, 2.0], 0.0, []),
+     ([0.0, 0.0, 0.0], 0.1, ["front"])],
+)  # fmt: skip
+def test_who_stands_at_the_end_is_told_by_the_end(
+    speed: list[float], rear: float, legs: list[str]
+) -> None:
+    columns = {"body/vx [m.s-1]": np.array(speed), "front/foot/z [m]": np.zeros(3),
+               "rear/foot/z [m]": np.array([0.0, 0.0, rear])}  # fmt: skip
+    assert ends_standing(Trajectory(np.arange(3.0), columns), ("front", "rear")) == legs

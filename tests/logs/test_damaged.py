@@ -101,6 +101,17 @@ def test_channels_without_readings(tmp_path: Path) -> None:
     )
 
 
+def test_data_of_tdms_that_are_of_no_channel(tmp_path: Path) -> None:
+    """Under a name in which the marks between group and channel are damaged."""
+    file = tdms(robot_log(40), tmp_path / "log.tdms", "Time")
+    content = file.read_bytes()
+    assert content.count(b"/'log'/'rear_hip_q'") == 1
+    file.write_bytes(content.replace(b"/'log'/'rear_hip_q'", b"/'log___rear_hip_q'"))
+    found = raw_columns(file, None)
+    assert "rear_hip_q" not in found.columns
+    assert found.remarks[0] == "it is damaged: 1 objects with data are no channels"
+
+
 def test_a_group_of_mdf_that_is_shorter_than_it_says(tmp_path: Path) -> None:
     file = mdf(robot_log(40), tmp_path / "log.mf4")
     content = file.read_bytes()
@@ -110,6 +121,11 @@ def test_a_group_of_mdf_that_is_shorter_than_it_says(tmp_path: Path) -> None:
     found = raw_columns(file, None)
     assert found.remarks == ("it breaks off: 40 of 50 readings of a group are there",)
     assert len(found.columns["time"]) == 40
+    at = content.index(b"##DT")
+    file.write_bytes(content[:at] + bytes(4) + content[at + 4 :])
+    found = raw_columns(file, None)
+    assert found.remarks == ("it breaks off: 0 of 4 readings of a group are there",)
+    assert "body_x" not in found.columns
 
 
 def test_of_a_damaged_file_nothing_else_is_printed(
@@ -146,6 +162,17 @@ def test_objects_of_matlab_that_cannot_be_read(
         "left out, since they are not as long as their times: body/x",
         "2 objects cannot be read: damaged, or of a newer MATLAB",
     )
+
+
+def test_vectors_without_entries_are_no_log(tmp_path: Path) -> None:
+    """SciPy takes a damaged head for an old version, and reads one odd variable."""
+    np.savez(tmp_path / "log.npz", time=np.zeros(0), x=np.zeros(0))
+    with pytest.raises(KembaError, match="holds no vector of numbers: 'time' of shape"):
+        raw_columns(tmp_path / "log.npz", None)
+    file = logs_out(robot_log(40), tmp_path / "log.mat")
+    file.write_bytes(bytes(16) + file.read_bytes()[16:300])
+    with pytest.raises(KembaError, match=r"log\.mat"):
+        raw_columns(file, None)
 
 
 def test_a_changed_byte_in_our_parquet_is_known(tmp_path: Path) -> None:

@@ -42,3 +42,15 @@ def test_channels_on_another_clock_are_named_and_no_others() -> None:
     log = Trajectory(time, {"body/x [m]": x, "body/z [m]": z, "body/pitch [rad]": pitch})
     (said,) = one_clock(log).meta["read"]
     assert said.startswith("body/z have a clock of their own")
+
+
+def test_rows_that_go_back_are_left_as_they_are() -> None:
+    """Their fault is told where the log is checked, and not covered here."""
+    time = np.arange(200) * 1e-3
+    x, z = (np.full(len(time), np.nan) for _ in range(2))
+    x[::2], z[1::4] = time[::2], time[1::4]
+    columns = {"body/x [m]": x, "body/z [m]": z}
+    assert len(one_clock(Trajectory(time, columns))) == 100
+    time[120] = time[110]
+    log = Trajectory(time, columns)
+    assert one_clock(log) is log

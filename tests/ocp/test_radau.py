@@ -36,3 +36,11 @@ def test_a_step_of_a_linear_equation_is_pades(scheme: Scheme) -> None:
         taylor = [1.0 / math.factorial(k) for k in range(2 * scheme.stages)]
         above, below = pade(taylor, scheme.stages, scheme.stages - 1)
         assert growth == pytest.approx(above(z) / below(z), rel=1e-6, abs=1e-10)
+
+
+def test_schemes_are_called_by_their_order() -> None:
+    """2 stages - 1, as the weights of the last row integrate: t^k for k up to twice that less 2."""
+    for scheme, order in ((RADAU3, 3), (RADAU5, 5), (RADAU9, 9)):
+        weights = scheme.butcher[-1]
+        errors = [weights @ scheme.points**k - 1.0 / (k + 1) for k in range(order + 1)]
+        assert np.abs(errors[:-1]).max() < 1e-12 and abs(errors[-1]) > 1e-6

@@ -48,6 +48,7 @@ def test_positive_definite_problems_are_solved_from_any_guess(seed: int, n: int)
     pivoted = solve(A, b, np.zeros(n, dtype=bool), pivoting=True)
     assert np.allclose(found.z[:n], pivoted.z[:n], atol=1e-7)
     assert not found.z[:n][~found.on[:n]].any()
+    assert (pivoted.on[:n] == (pivoted.z[:n] > 0.0)).all()
 
 
 @settings(max_examples=60, deadline=None)

@@ -9,7 +9,7 @@ from PIL import Image
 
 from kemba.errors import KembaError
 from kemba.plotting.source import Machine, Source, poses
-from kemba.plotting.sticks import animate, save_animation
+from kemba.plotting.sticks import MODES, animate, save_animation
 
 
 def distance(points: dict[str, np.ndarray], start: str, end: str) -> float:
@@ -79,3 +79,8 @@ def test_what_cannot_be_animated(log: Source, machine: Machine) -> None:
     bare = Source("bare", log.trajectory.select(["body/z", "front/hip/q"]))
     with pytest.raises(KembaError, match=r"bare: cannot be animated; body/z, hip/q and piston/x"):
         animate(bare, machine)
+
+
+def test_every_mode_of_a_cylinder_has_its_own_colour() -> None:
+    assert set(MODES) == {(extend, retract) for extend in (0, 1) for retract in (0, 1)}
+    assert len(set(MODES.values())) == 4

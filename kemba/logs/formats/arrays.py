@@ -96,7 +96,7 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
             found[name] = array
         elif array.ndim == 2 and min(array.shape) > 1:
             found |= _matrix(name, array, arrays)
-    if not found:
+    if not any(len(array) for array in found.values()):
         held = ", ".join(f"'{n}' of shape {a.shape}" for n, a in list(arrays.items())[:6])
         what = f"holds no vector of numbers: {held or 'nothing at all'}"
         raise KembaError(str(path), what, "one for each column was expected")

@@ -55,7 +55,7 @@ def _mdf_group(file: Any, number: int, said: list[str]) -> Group | None:
             time[begin:read] = signal.timestamps
         if read < begin + PIECE:
             break  # the last piece, or a file that was cut off
-    if read < stated and table:
+    if read < stated and (table or not rows):
         said.append(f"it breaks off: {read} of {stated} readings of a group are there")
     columns: Raw = {}
     units: dict[str, str] = {}
@@ -91,6 +91,11 @@ def read_tdms(path: Path) -> Recording:
         if empty := [c.name for c in every if not len(c)]:
             more = " and more" if len(empty) > 6 else ""
             said.append(f"without any reading: {', '.join(empty[:6])}{more}")
+        # data under a path that is no channel's, as where a name is damaged, nptdms leaves out
+        known = {channel.path for channel in every}
+        objects = file._reader.object_metadata.items()
+        if lost := sum(o.num_values > 0 and path not in known for path, o in objects):
+            said.append(f"it is damaged: {lost} objects with data are no channels")
         check_size(path, sum(8 * len(channel) for channel in channels))
         starts = [
             c.properties["wf_start_time"] for c in channels if "wf_start_time" in c.properties

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from kemba.identify.logs.gate import limits_of
+from kemba.identify.logs.reading import thinned
 from kemba.trajectory import Trajectory
 
 
@@ -47,3 +48,14 @@ def test_what_a_locked_rod_does_not_show_is_said_unless_another_log_moves() -> N
     (remark,) = limits_of([still])
     assert remark.startswith("the rod does not move (piston/x 35 mm): friction, damping and")
     assert limits_of([still, moving]) == []
+
+
+def test_thinned_logs_keep_every_row_in_which_a_valve_switches() -> None:
+    """Of 10 kHz every tenth row, and the one of the edge; of 1 kHz all."""
+    time = 1e-4 * np.arange(100)
+    sent = (np.arange(100) >= 47).astype(float)
+    quick = Trajectory(time, {"body/z [m]": time, "valve/extend [1]": sent})
+    found = thinned(quick)
+    assert found.time == pytest.approx(1e-4 * np.array([0, 10, 20, 30, 40, 47, 50, 60, 70, 80, 90]))
+    slow = Trajectory(10 * time, {"body/z [m]": time})
+    assert thinned(slow) is slow
