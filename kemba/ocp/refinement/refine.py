@@ -276,12 +276,12 @@ class Refiner:
     def carried(
         self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The exact program with a scheme and its start (size,), from a solution of another one;
-        with rows between nodes where that was solved along the motion and is near to what it is to
-        keep off."""
+        """The exact program with a scheme and its start (size,), from a solution of another. One
+        with the most stages begins at an exact solution: with rows between nodes where that is near
+        to what it keeps off."""
         program, _ = self.build(other.phases, self.plan, scheme)
         start = carried(program, other.columns, other.scheme.points, x)
-        if other.scheme is not RADAU3:
+        if scheme is RADAU9:
             add_missed(program, start, Refining.near_rows)
         return program, start
 
