@@ -39,6 +39,7 @@ FEWEST_STILL = 8  # readings per channel that a vessel's log needs
 MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
 END = 0.1  # share of the stroke that a moving rod leaves; a tenth is another unit
+SHARE = 0.2  # travel, as a share of the farthest place, from which a rod moves
 UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
@@ -163,6 +164,8 @@ def _values(log: Trajectory) -> Iterator[KembaError]:
             yield from _frozen(log, name, y)
         if name.endswith("piston/x"):
             yield from _leap(log, name, y)
+        if name == "piston/x":
+            yield from _at_end(log, name, y)
     yield from _excitation(log)
 
 
@@ -309,11 +312,18 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
             what = f"moves by {1e3 * _travel(y):.4g} mm"
             expected = f"a stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
             yield _log_fault(log, what, expected, "is its unit wrong? See --map", column=name)
-        elif name == "piston/x" and np.nanmax(np.abs(y)) < END * log.meta["stroke"]:
-            what = f"stays within {1e3 * np.nanmax(np.abs(y)):.3g} mm of the retracted end"
-            expected = f"motion along the stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
-            hint = "its unit is wrong (see --map), or the rod must be moved farther"
-            yield _log_fault(log, what, expected, hint, column=name)
+        elif name == "piston/x":
+            yield from _at_end(log, name, y)
+
+
+def _at_end(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
+    """A rod that moves and comes nowhere: a tenth of the stroke is another unit."""
+    farthest, stroke = float(np.nanmax(np.abs(y))), log.meta.get("stroke", 0.0)
+    if farthest < END * stroke and _travel(y) > SHARE * farthest:
+        what = f"stays within {1e3 * farthest:.3g} mm of the retracted end"
+        expected = f"motion along the stroke of {1e3 * stroke:.4g} mm was expected"
+        hint = "its unit is wrong (see --map), or the rod must be moved farther"
+        yield _log_fault(log, what, expected, hint, column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:
