@@ -25,6 +25,7 @@ from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory, check_headers, check_times, sidecar
 
 
+@np.errstate(invalid="ignore", over="ignore")  # readings that cannot be are missing ones later
 def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
     """The trajectory that a map makes of the columns of a file.
 

@@ -9,6 +9,7 @@ from kemba.model import load_spec
 from kemba.model.lags import with_lags
 from kemba.ocp import Plan, controller_table
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.phases.radau import RADAU9
 from kemba.ocp.planned import answer, sentence_of, warnings
 from kemba.plant.repeat import another_robot, carried_over, lacking
 from kemba.plant.retiming import retimed
@@ -22,7 +23,6 @@ AIR = (
     "the simulated robot has physical chambers, and this plan has first-order ones: plan with "
     "--model orifice on the shipped robot, with `chambers: orifice` in the model of another"
 )
-MOST = 5  # stages of an element
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
@@ -74,7 +74,7 @@ class Trial:
     def inputs_miss(self) -> bool:
         """Whether its inputs miss on its own model, and its elements have few stages."""
         done, stages = self.judged, self.plan.stages
-        few = stages is not None and stages.stages < MOST
+        few = stages is not None and stages.stages < RADAU9.stages
         return few and done is not None and not done.verdicts["replay"].good
 
     @property

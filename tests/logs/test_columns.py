@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kemba.errors import ConfigErrors
+from kemba.identify.logs.reading import read_log
 from kemba.logs.columns import ColumnMap, ColumnSource, check_map
 from kemba.logs.foreign import mapped
 from kemba.logs.recording import Recording
@@ -41,3 +42,16 @@ def test_times_of_half_the_digits_are_counted_with_all() -> None:
     found = mapped(raw, ColumnMap(origin="first", columns=columns), Path("log.npz"))
     assert found.time.tolist() == (time.astype(float) - float(time[0])).tolist()
     assert found.time[-1] != float(time[-1] - time[0])
+
+
+def test_bytes_that_are_no_reading_are_read_without_a_warning(tmp_path: Path) -> None:
+    """A NaN that signals, and a number whose conversion overflows, are missing readings."""
+    force = np.linspace(0.0, 1e-3, 2000)
+    force[1] = 1.7e308
+    force.view(np.uint64)[2] = 0x7FF0_0000_0000_0001
+    time = np.arange(2000) * 1e-3
+    np.savez(tmp_path / "log.npz", t=time, F=force)
+    columns = {"time [s]": TIME, "piston/F [N]": ColumnSource(source="F", unit="kN")}
+    found = read_log(tmp_path / "log.npz", ColumnMap(kind="bench", columns=columns))
+    assert np.flatnonzero(np.isnan(found["piston/F"])).tolist() == [1, 2]
+    assert found["piston/F"][-1] == pytest.approx(1.0)

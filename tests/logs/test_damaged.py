@@ -1,12 +1,13 @@
 """What a damaged log has lost is said, wherever its format lets it be known."""
 
 import gc
+import json
 import sqlite3
 import struct
+import warnings
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,8 +17,7 @@ from loggers import bag, mdf, tdms, ulog
 from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs.foreign import raw_columns
-from kemba.logs.formats import arrays
-from kemba.logs.formats.mat_child import Found
+from kemba.logs.formats import arrays, mat_child
 from kemba.report.export import export
 
 DAMAGED = "it is damaged or breaks off: what is left is read"
@@ -143,25 +143,35 @@ def test_of_a_damaged_file_nothing_else_is_printed(
     assert capfd.readouterr() == ("", "")
 
 
-def test_objects_of_matlab_that_cannot_be_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """mat-io gives their numbers instead of their properties."""
-    found = Found()
-    good = SimpleNamespace(classname="timeseries", properties={"Time": np.arange(3.0)})
-    bad = SimpleNamespace(classname="None", properties=np.array([1, 2], np.uint32))
-    for value in (good, bad, bad):
-        found.fields(value)
-    assert len(found.unread) == 1
+def test_what_matlab_files_leave_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Objects that mat-io does not know, by its own words, and series of other lengths."""
     file = logs_out(robot_log(40), tmp_path / "log.mat")
     whole = arrays._sorted_out(file)
-    assert raw_columns(file, None).remarks == () and whole[0]["unread"] == 0
+    assert raw_columns(file, None).remarks == () and whole[0]["warnings"] == []
     shorter = {**whole[1], "a1": whole[1]["a1"][:-1]}
-    monkeypatch.setattr(arrays, "_sorted_out", lambda _: ({**whole[0], "unread": 2}, shorter))
+    index = {**whole[0], "warnings": ["Unknown property type 7", "Failed to load"]}
+    monkeypatch.setattr(arrays, "_sorted_out", lambda _: (index, shorter))
     assert raw_columns(file, None).remarks == (
         "left out, since they are not as long as their times: body/x",
-        "2 objects cannot be read: damaged, or of a newer MATLAB",
+        "damaged, or of a newer MATLAB: Unknown property type 7; Failed to load",
     )
+
+
+def test_warnings_of_mat_io_are_passed_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of other packages are not."""
+    warning = pytest.importorskip("matio.utils.matclass").MatReadWarning
+
+    def content(path: str) -> dict[str, np.ndarray]:
+        for category in (warning, warning, UserWarning):
+            warnings.warn("Unknown property type 7", category, stacklevel=1)
+        return {"x": np.arange(3.0)}
+
+    monkeypatch.setattr(mat_child, "content", content)
+    monkeypatch.setattr(mat_child, "limit_memory", lambda: None)
+    monkeypatch.setattr("sys.argv", ["", "log.mat", str(tmp_path / "out.npz")])
+    assert mat_child.main() == 0
+    with np.load(tmp_path / "out.npz") as found:
+        assert json.loads(str(found["index"]))["warnings"] == ["Unknown property type 7"]
 
 
 def test_vectors_without_entries_are_no_log(tmp_path: Path) -> None:

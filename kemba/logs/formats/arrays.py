@@ -257,8 +257,8 @@ def read_mat(path: Path) -> Recording:
     said = [f"left out, since they have no times: {', '.join(left[:6])}"] if left else []
     if other:
         said.append(f"left out, since they are not as long as their times: {', '.join(other[:6])}")
-    if index["unread"]:
-        said.append(f"{index['unread']} objects cannot be read: damaged, or of a newer MATLAB")
+    if index["warnings"]:
+        said.append(f"damaged, or of a newer MATLAB: {'; '.join(index['warnings'][:3])}")
     return recording(found, said)
 
 

@@ -11,6 +11,7 @@ and times (timeseries, signals of a Simulink structure with time, timetables), a
 import contextlib
 import json
 import sys
+import warnings
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.io.matlab import MatlabOpaque
 
 MEMORY = 6_000_000_000  # bytes: an unpacked log of the size that is allowed, three times
 HDF5 = b"\x89HDF\r\n\x1a\n"  # of version 7.3, behind a header or at once
+SAID = 100  # letters of a warning that are passed on
 DEEPEST = 12  # structs within structs
 CONTAINERS = ("values", "elements", "data", "storage", "signals")  # say nothing about a signal
 
@@ -30,7 +32,6 @@ class Found:
         self.series: list[tuple[str, np.ndarray, np.ndarray]] = []
         self.loose: dict[str, np.ndarray] = {}
         self.classes: list[str] = []
-        self.unread: set[int] = set()  # objects without properties, by identity
 
     def walk(self, path: str, value: Any, depth: int = 0, named: bool = True) -> None:
         """Everything in a value that is a series or an array; `named`: the path is its own."""
@@ -69,10 +70,7 @@ class Found:
             self.classes.append(str(value.classname))
             if isinstance(properties, dict):
                 return properties
-            found = self.fields(properties) if isinstance(properties, np.ndarray) else None
-            if found is None:
-                self.unread.add(id(value))
-            return found or {}
+            return self.fields(properties) if isinstance(properties, np.ndarray) else {}
         return None
 
     def struct(self, path: str, fields: dict[str, Any], depth: int, own: bool) -> None:
@@ -232,17 +230,21 @@ def main() -> int:
     """Write the arrays of the file argv[1] to argv[2]; 1 where it cannot be read."""
     limit_memory()
     try:
-        found = walked(content(sys.argv[1]))
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            found = walked(content(sys.argv[1]))
     except SystemExit:
         print("PACKAGE", file=sys.stderr)
         return 1
     except Exception as error:  # of damaged bytes the readers raise anything
         print(f"{type(error).__name__}: {error}"[:200], file=sys.stderr)
         return 1
+    # mat-io warns of objects that it leaves out
+    warned = {str(w.message)[:SAID] for w in told if w.category.__module__.startswith("matio")}
     arrays: list[np.ndarray] = []
     times: list[int] = []
     index: dict[str, Any] = {"series": [], "loose": [], "classes": sorted(set(found.classes))}
-    index["unread"] = len(found.unread)
+    index["warnings"] = sorted(warned)
     for name, time, values in found.series:
         at = next((i for i in times if np.array_equal(arrays[i], time)), None)
         if at is None:

@@ -142,8 +142,8 @@ class Continuation:
         refiner = Refiner(
             self.model, self.task, self.requirements, mesh.start, reduction, self.control
         )
-        five = mesh.stages is not None and mesh.stages.stages == RADAU9.stages
-        program, x = refiner.build(mesh.phases, mesh.start, RADAU9 if five else RADAU5)
+        most = mesh.stages is not None and mesh.stages.stages == RADAU9.stages
+        program, x = refiner.build(mesh.phases, mesh.start, RADAU9 if most else RADAU5)
         kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
         if self.origin.finer and kept is not None:
             program, kept = refiner.carried(RADAU9, program, kept)
@@ -151,8 +151,7 @@ class Continuation:
         if self.origin.ticks:
             on_ticks(program, x)
         begin = Iterate(x)
-        same = mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases)
-        if same and not self.origin.finer and mesh.stages is not None:
+        if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
             begin = mesh.stages.iterate(program, x)
         options = warm(min(Continuing.iterations, self.task.solver.max_iterations))
         mu = ipopt.last_barrier(Refining.tol)

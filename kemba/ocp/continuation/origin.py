@@ -24,9 +24,8 @@ class Origin:
     `name`: what sentences call it; `dear`: what to do where the new plan costs much more. `once`:
     where the earlier phases do not fit, they are not read anew. `ticks`: valve edges of the new
     plan are on the controller's ticks; where that fails at once, these ticks do not fit, and
-    nothing else is tried. `finer`: five stages an
-    element. `stages`: the solved program of the plan, where it is at hand. `run`: its
-    folder; `given`: whether the user named it.
+    nothing else is tried. `finer`: its elements have five stages. `stages`: the solved program of
+    the plan, where it is at hand. `run`: its folder; `given`: whether the user named it.
     """
 
     plan: Trajectory

@@ -1,6 +1,7 @@
 """Logs in which nothing is missing: coarse, slow, short, late ones, and clocks that are wrong."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -258,3 +259,19 @@ def test_no_lag_is_read_at_the_end_of_the_search(bench_log: BenchLog) -> None:
     moved = np.interp(run.motion.time + 0.53, run.motion.time, force)
     faults = contradictions(run, 0.07, lambda _: moved)
     assert not any("500 ms" in str(fault) for fault in faults)
+
+
+def test_times_as_long_as_a_row_are_looked_for_and_shorter_ones_are_not(
+    bench_log: BenchLog,
+) -> None:
+    model, run = load_model(rig=True), prepare("run", bench_log(duration=0.5))
+
+    def times(row: float) -> dict[str, float]:
+        problem = BenchProblem((replace(run, seen_within=row),), model)
+        found = problem.candidates.items()
+        return {n: c.lead.size for n, c in found if c.lead.unit == "s"}
+
+    usual = times(0.0)
+    shortest = min(usual, key=usual.__getitem__)
+    assert shortest in times(usual[shortest])
+    assert shortest not in times(1.001 * usual[shortest])

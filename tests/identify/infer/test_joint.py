@@ -1,6 +1,8 @@
 """The joint estimate that is written: all effects together, what it says of how sure it is."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from kemba.files import write_json
 from kemba.identify.adopt import adopt_answer, adopted
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import HeldOut
-from kemba.identify.infer.joint import conflicts_between_runs, joint_fit
+from kemba.identify.infer.joint import JointFit, conflicts_between_runs, joint_fit
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, quoted
 from kemba.model import load_spec, read_covariance
@@ -141,3 +143,16 @@ def test_adopt_of_what_is_sure_says_where_nothing_is(tmp_path: Path) -> None:
     with pytest.raises(KembaError, match="sure of no effect"):
         adopt_answer(folder, tmp_path / "none.yaml", only_sure=True)
     assert not (tmp_path / "none.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "holds"),
+    [(-1.0, 1.0, True), (0.0, 1.0, True), (-1.0, 0.0, True), (0.1, 1.0, False), (-1, -0.1, False)],
+)
+def test_an_interval_that_ends_at_the_absence_holds_it(
+    low: float, high: float, holds: bool
+) -> None:
+    """As that of a parameter which cannot be negative, and ends at its bound."""
+    fit: Any = SimpleNamespace(names=("kick.a",), low=[low], high=[high])
+    candidate: Any = SimpleNamespace(key="kick.a", lead=SimpleNamespace(off=0.0))
+    assert JointFit.holds_absence(fit, candidate) is holds
