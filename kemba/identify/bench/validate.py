@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from kemba.effects.pneumatics.switching import Pulse, inverted
 from kemba.errors import KembaError
-from kemba.identify.bench.bench_log import PRESSURES, BenchLog
+from kemba.identify.bench.bench_log import PRESSURES, BenchLog, SmoothedMotion
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 
@@ -34,6 +34,7 @@ SWAPPED = "valve/extend and valve/retract are swapped"
 INVERTED = "valve/extend and valve/retract are inverted (1 is on)"
 MOVED = "piston/F counts from another zero"
 REVERSED = "piston/F has the reversed sign (pushing is positive)"
+FULL = 1.1  # share of the stroke that a position may read
 Texts = tuple[str, ...]  # mistakes
 Left = dict[Texts, float]  # the share of the force's spread that is left without them
 
@@ -50,7 +51,6 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
         if some
         for more, left in _left(trial, predict).items()
     }
-    small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
     simple = simplest({texts: left for texts, (_, _, left) in trials.items()}, small)
     zero_alone = any(len(texts) == 1 and texts[0].startswith(MOVED) for texts in simple)
     if simple and not zero_alone:  # that is an effect, and no mistake
@@ -89,10 +89,13 @@ def crossed(run: BenchLog, expected: Mapping[str, tuple[Array, Array]]) -> list[
 def simplest(trials: Left, small: float) -> list[Texts]:
     """The fewest mistakes without which about the least is left, or as little as noise makes
     (`small`); none where the log as it is, (), leaves hardly more."""
+    small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
     least = min(trials.values())
-    close = [texts for texts, left in trials.items() if left <= max(ALIKE * least, small)]
-    simple = [texts for texts in close if len(texts) == len(min(close, key=len))]
-    return simple if () not in simple and least < CLOSE and least * BETTER < trials[()] else []
+    count = min(len(texts) for texts, left in trials.items() if left <= max(ALIKE * least, small))
+    alike = {texts: left for texts, left in trials.items() if len(texts) == count}
+    most = max(ALIKE * min(alike.values()), small)
+    simple = [texts for texts, left in alike.items() if left <= most]
+    return simple if count and least < CLOSE and least * BETTER < trials[()] else []
 
 
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
@@ -109,7 +112,11 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
     ]
     motion = run.motion
     turned = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
-    for (some, commands), (more, place) in product(valves, (((), motion), ((END,), turned))):
+    places: list[tuple[Texts, SmoothedMotion]] = [((), motion), ((END,), turned)]
+    if 10.0 * np.max(motion.x) < FULL * stroke:
+        far = replace(motion, x=10.0 * motion.x, v=10.0 * motion.v, a=10.0 * motion.a)
+        places.append((("piston/x is 10 times too small (its unit is wrong)",), far))
+    for (some, commands), (more, place) in product(valves, places):
         yield some + more, replace(run, commands=commands, motion=place)
 
 

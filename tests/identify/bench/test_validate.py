@@ -17,6 +17,7 @@ UNITS = {"m": "piston/x", "N": "piston/F"}
 SWAPPED = {"valve/extend": ("valve/retract", 1.0, 0.0), "valve/retract": ("valve/extend", 1.0, 0.0)}
 OFF = {name: (name, -1.0, 1.0) for name in SWAPPED}
 TURNED, END = {"piston/F": ("piston/F", -1.0, 0.0)}, {"piston/x": ("piston/x", -1.0, STROKE)}
+TENTH = {"piston/x": ("piston/x", 0.1, 0.0)}
 # mistakes: column -> the one it is read from, sign and zero; and words of each
 MISTAKES: dict[str, tuple[dict[str, tuple[str, float, float]], str]] = {
     "force": (TURNED, r"piston/F has the reversed sign \(pushing is positive\); the"),
@@ -50,6 +51,11 @@ MISTAKES: dict[str, tuple[dict[str, tuple[str, float, float]], str]] = {
         SWAPPED | {"piston/F": ("piston/F", 1.0, 60.0)},
         r"are swapped and piston/F counts from another zero \(`offset: -(59|60)",
     ),
+    "decimetres, valves and force": (
+        SWAPPED | TURNED | TENTH,
+        r"are swapped and piston/x is 10 times too small .* and piston/F has the reversed sign",
+    ),
+    "decimetres": (TENTH, r"run_0: piston/x is 10 times too small \(its unit is wrong\); the"),
     "kilonewtons": (
         {"piston/F": ("piston/F", -1e-3, 0.0)},
         r"run_0: piston/F has the reversed sign .* and piston/F seems to be in kN; the force",
@@ -73,6 +79,8 @@ def corrected(log: Trajectory, said: str) -> Trajectory:
     for names in re.findall(r"([\w/ ]+) (?:is|are) inverted", said):
         off = {name for name in SWAPPED if name in names}
         change |= {a: (change.get(a, OFF[a])[0], -1.0, 1.0) for a in off}
+    if "piston/x is 10 times too small" in said:
+        change |= {"piston/x": ("piston/x", 10.0, 0.0)}
     if "extended end" in said:
         change |= END
     if "piston/F has the reversed sign" in said:
