@@ -257,7 +257,8 @@ def _remarks(log: Trajectory) -> Iterator[str]:
     yield from (f"{name}: {said}" for said in log.meta.get("read", ()))
     if "piston/x" in log:
         x, stroke = log["piston/x"], log.meta.get("stroke", 0.0)
-        if (farthest := float(np.nanmax(np.abs(x)))) < END * stroke and _travel(x) > SHARE * farthest:
+        farthest = float(np.nanmax(np.abs(x)))
+        if farthest < END * stroke and _travel(x) > SHARE * farthest:
             yield (
                 f"{name}: piston/x stays within {1e3 * farthest:.3g} mm of the retracted end, of a "
                 f"stroke of {1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong "

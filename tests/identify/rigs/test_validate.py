@@ -215,7 +215,7 @@ def test_a_small_motion_near_the_end_is_read_and_said(place: float, tmp_path: Pa
     ("scale", "words"),
     [
         (1000.0, r"log: has a row every 2 s; at least 2 rows a second; is the time in millis"),
-        (100.0, r"log: the time is about (100|99) times too large \(its unit is wrong\); the force"),
+        (100.0, r"log: the time is about (100|99) times too large \(its unit is wrong\); "),
         (0.1, r"log: the time is about (10|9\.\d) times too small \(its unit is wrong\); the"),
     ],
 )
