@@ -67,7 +67,7 @@ RANGES = {
     "body/z": (
         -0.1,
         3.0,
-        "metres above the ground; is it in millimetres, or counted downwards?",
+        "metres above the ground; is it in millimetres, counted downwards, or swapped with body/x?",
     ),
     "body/vx": (-20.0, 20.0, "metres per second"),
     "body/vz": (-20.0, 20.0, "metres per second"),

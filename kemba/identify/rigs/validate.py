@@ -107,8 +107,9 @@ def _scaled(log: RigLog, name: str, size: float) -> RigLog:
     """A log with exp(size) times the readings of one channel, or times as long."""
     gain, c, others = float(np.exp(size)), log.channels, log.channels.others
     if name == TIME:
-        rates = {"v": c.v / gain, "quick": c.quick / gain, "a": c.a / gain**2}
-        return replace(log, channels=replace(c, time=gain * c.time, width=gain * c.width, **rates))
+        v, quick, a, width = c.v / gain, c.quick / gain, c.a / gain**2, gain * c.width
+        slower = replace(c, time=gain * c.time, width=width, v=v, quick=quick, a=a)
+        return replace(log, channels=slower)
     if name in others:
         return _moved(log, 1.0, 0.0, {**others, name: gain * others[name]})
     return _moved(log, gain, 0.0, others)
@@ -118,8 +119,8 @@ def _exchanged(log: RigLog, answer: str) -> RigLog:
     """A log with the readings of position and force exchanged."""
     c, q = log.channels, log.channels.others[answer]
     v = np.gradient(q, c.time)
-    rates = {"v": v, "quick": v, "a": np.gradient(v, c.time)}
-    return replace(log, channels=replace(c, others={**c.others, answer: c.q}, q=q, read=q, **rates))
+    a, others = np.gradient(v, c.time), {**c.others, answer: c.q}
+    return replace(log, channels=replace(c, others=others, q=q, read=q, v=v, quick=v, a=a))
 
 
 def _best(

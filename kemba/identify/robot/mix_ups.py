@@ -155,7 +155,7 @@ TURNED = "body/pitch has the reversed sign (nose up is positive)"
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
     """Mistakes of one kind each, effects that may look alike, and how to put each right."""
-    yield from islice(slight(legs), 3)  # not two of them together
+    yield from islice(slight(legs), 2 + (len(legs) == 2))  # each of them alone
     yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
     yield _unit("body/pitch", ["body/pitch"])
     yield _unit("body/x", ["body/x"])
@@ -218,6 +218,8 @@ def slight(legs: Sequence[str]) -> Iterator[MixUp]:
         )
         yield pistons
         yield _together(f"{TURNED} and {pistons.text}", pitch, pistons)
+    whose, some = _groups(legs)[0]
+    yield _unit(f"piston/x of {whose}", [f"{leg}/piston/x" for leg in some])
 
 
 def command_mix_ups(legs: Sequence[str]) -> Iterator[MixUp]:

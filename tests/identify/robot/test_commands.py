@@ -71,6 +71,14 @@ def test_valves_of_the_other_leg_in_an_even_hop() -> None:
         problem(taken(log, crossed)).validate()
 
 
+def test_pistons_in_another_unit_hardly_move_feet_of_legs_that_stand_drawn_in() -> None:
+    """The model leaves much less without; no effect of air or boom is named instead."""
+    (log,), _ = hops(runs=1, seed=12, figures_off=0.01)
+    read = {f"{leg}/piston/x": log[f"{leg}/piston/x"] / 10.0 for leg in LEGS}
+    with pytest.raises(BadData, match="hop0: piston/x of every leg is 10 times too small"):
+        problem(taken(log, read)).validate()
+
+
 def test_two_mistakes_about_commands(logs: list[Trajectory]) -> None:
     read = {name: -logs[0][name] for name in TORQUES} | {FRONT[0]: 1.0 - logs[0][FRONT[0]]}
     words = (
