@@ -97,16 +97,18 @@ def refine(
     plan: Trajectory,
     control: Control | None = None,
     tell: Tell = silent,
+    pulses: bool = True,
 ) -> Refined:
     """The plan solved again with its modes kept and the durations of its phases free.
 
     It is solved by half the robot where plan and task allow it. `tell` gets the name of every
-    solve.
+    solve. `pulses`: of valves are put in where they lower the cost.
     """
     reduction = reduction_of(model, task, requirements, plan)
     refiner = Refiner(model, task, requirements, plan, reduction, control or Control(), tell)
     try:
-        return refiner.run()
+        found = refiner.run()
+        return refiner.improved(found) if pulses else found
     except ContradictionError as error:
         return Refined(None, None, Ending.UNSUITABLE, refiner.iterations, reason=str(error))
     except ValueError as error:
@@ -150,7 +152,7 @@ class Refiner:
                 found = self.repair(phases, found)
             if found.done:
                 break
-        return replace(self.improved(found), iterations=self.iterations)
+        return replace(found, iterations=self.iterations)
 
     def phases(self, trim: bool = False) -> list[Phase]:
         """The phases of the plan; see `read_phases`. Raises ValueError for a model to which the
@@ -171,8 +173,8 @@ class Refiner:
         best = with_pulses(self.solution, lambda p: self.build(p, start, scheme)[0], self.control)
         if best is self.solution:
             return found
-        made = read(*best)
-        return replace(made, plain=found) if self._keeps(made) else found
+        made = replace(read(*best), plain=found, iterations=self.iterations)
+        return made if self._keeps(made) else found
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended.
