@@ -22,6 +22,7 @@ from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -149,6 +150,8 @@ class Continuation:
         if self.origin.finer and kept is not None:
             program, kept = refiner.carried(RADAU9, program, kept)
         x = with_impacts(program, x, Continuing.ease) if kept is None else kept
+        if not self.task.scene.even:
+            add_missed(program, x, Refining.near_rows)
         if self.origin.ticks:
             on_ticks(program, x)
         begin = Iterate(x)

@@ -278,12 +278,12 @@ class Refiner:
     def carried(
         self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The exact program with a scheme and its start (size,), from a solution of another. One
-        with the most stages begins at an exact solution: with rows between nodes where that is near
-        to what it keeps off."""
+        """The exact program with a scheme and its start (size,), from a solution of another: with
+        rows between nodes where that is near to what it keeps off, where there are corners to be
+        cut, or most stages, which begin at an exact solution."""
         program, _ = self.build(other.phases, self.plan, scheme)
         start = carried(program, other.columns, other.scheme.points, x)
-        if scheme is RADAU9:
+        if scheme is RADAU9 or not self.task.scene.even:
             add_missed(program, start, Refining.near_rows)
         return program, start
 
