@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 from kemba.effects.pneumatics.switching import Pulse, inverted
 from kemba.errors import KembaError
-from kemba.identify.bench.bench_log import PRESSURES, BenchLog
+from kemba.identify.bench.bench_log import PRESSURES, BenchLog, SmoothedMotion
 from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 
@@ -25,13 +25,16 @@ RESOLUTION = 1e-3  # resolution of lags [s]: a usual row
 SHORTEST = 400  # steps of resolution that a lag can be read from
 FARTHEST = 0.5  # longest lag [s]
 LIKE = 0.3  # correlation that a lag must reach
+HALF = 2.0  # factor by which the model must err less without a lag
 MORE_ALIKE = 1.5  # factor by which a lag must raise the correlation
 
 UNITS = {"": 1.0, "kN": 1e3, "mN": 1e-3, "lbf": 4.4482, "kgf": 9.81}  # [N]
 END = "piston/x counts from the extended end (0 is retracted)"
 SWAPPED = "valve/extend and valve/retract are swapped"
 INVERTED = "valve/extend and valve/retract are inverted (1 is on)"
+MOVED = "piston/F counts from another zero"
 REVERSED = "piston/F has the reversed sign (pushing is positive)"
+FULL = 1.1  # share of the stroke that a position may read
 Texts = tuple[str, ...]  # mistakes
 Left = dict[Texts, float]  # the share of the force's spread that is left without them
 
@@ -48,9 +51,9 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
         if some
         for more, left in _left(trial, predict).items()
     }
-    small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
     simple = simplest({texts: left for texts, (_, _, left) in trials.items()}, small)
-    if simple:
+    zero_alone = any(len(texts) == 1 and texts[0].startswith(MOVED) for texts in simple)
+    if simple and not zero_alone:  # that is an effect, and no mistake
         said = [" and ".join(texts) for texts in simple]
         if END in simple[0]:
             said[0] += _zero(*trials[simple[0]], stroke, predict)
@@ -86,10 +89,13 @@ def crossed(run: BenchLog, expected: Mapping[str, tuple[Array, Array]]) -> list[
 def simplest(trials: Left, small: float) -> list[Texts]:
     """The fewest mistakes without which about the least is left, or as little as noise makes
     (`small`); none where the log as it is, (), leaves hardly more."""
+    small = min(small, CLOSE / BETTER)  # noise of a force in another unit is none of ours
     least = min(trials.values())
-    close = [texts for texts, left in trials.items() if left <= max(ALIKE * least, small)]
-    simple = [texts for texts in close if len(texts) == len(min(close, key=len))]
-    return simple if () not in simple and least < CLOSE and least * BETTER < trials[()] else []
+    count = min(len(texts) for texts, left in trials.items() if left <= max(ALIKE * least, small))
+    alike = {texts: left for texts, left in trials.items() if len(texts) == count}
+    most = max(ALIKE * min(alike.values()), small)
+    simple = [texts for texts, left in alike.items() if left <= most]
+    return simple if count and least < CLOSE and least * BETTER < trials[()] else []
 
 
 def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
@@ -106,7 +112,11 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
     ]
     motion = run.motion
     turned = replace(motion, x=stroke - motion.x, v=-motion.v, a=-motion.a)
-    for (some, commands), (more, place) in product(valves, (((), motion), ((END,), turned))):
+    places: list[tuple[Texts, SmoothedMotion]] = [((), motion), ((END,), turned)]
+    if 10.0 * np.max(motion.x) < FULL * stroke:
+        far = replace(motion, x=10.0 * motion.x, v=10.0 * motion.v, a=10.0 * motion.a)
+        places.append((("piston/x is 10 times too small (its unit is wrong)",), far))
+    for (some, commands), (more, place) in product(valves, places):
         yield some + more, replace(run, commands=commands, motion=place)
 
 
@@ -123,10 +133,9 @@ def _left(run: BenchLog, predict: Predict) -> Left:
             texts = (REVERSED,) * (sign < 0.0) + (f"piston/F seems to be in {unit}",) * bool(unit)
             gap, spread = predicted - sign * factor * force, _spread(factor * force)
             found[texts] = rms(gap) / spread
-            if sign < 0.0:
-                moved = f"`sign: -1, offset: {np.mean(gap):+.3g} N`"
-                zero = (*texts, f"piston/F counts from another zero ({moved})")
-                found[zero] = float(np.std(gap)) / max(factor * float(np.std(force)), 1.0)
+            moved = f"`{'sign: -1, ' * (sign < 0.0)}offset: {np.mean(gap):+.3g} N`"
+            zero = (*texts, f"{MOVED} ({moved})")
+            found[zero] = float(np.std(gap)) / max(factor * float(np.std(force)), 1.0)
     return {texts: left for texts, left in found.items() if np.isfinite(left)}
 
 
@@ -176,5 +185,10 @@ def _clock(run: BenchLog, predict: Predict) -> list[KembaError]:
         return []
     late = f"{abs(lag) * 1e3:.0f} ms {'late' if lag > 0 else 'early'}"
     what = f"piston/F comes {late} against the valves and the motion"
+    force, predicted = run.measured["piston/F"][keep], predict(run)[keep]
+    there = np.interp(time + lag, time, force)
+    if rms(predicted - there) * HALF > rms(predicted - force):  # no delay explains it
+        hint = "is the unit of the time wrong, or is this the log of another cylinder?"
+        return [KembaError(run.name, what, "and no clock that is late alone explains it", hint)]
     expected = "one clock for all columns was expected"
     return [KembaError(run.name, what, expected, "correct it with `delay` in a column map")]

@@ -80,8 +80,9 @@ def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
         kind, _, channel = effect.partition(":")
         if kind == "sensor_scale" and abs(values(search, best, effect)["k"].value) > GROSS:
             gains[channel] = "sensor"
-        if kind == "axis_scale" and not 1 / MOTOR < values(search, best, effect)["k"].value < MOTOR:
-            gains["axis/tau"] = "motor"
+        torque = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}.get(kind)
+        if torque and not 1 / MOTOR < values(search, best, effect)["k"].value < MOTOR:
+            gains[torque] = "motor"
     return tuple(
         f"the gain of {channel} would be off by more than any {what}'s is; its unit is wrong, or "
         "its scale or offset in a map (--map)"

@@ -38,7 +38,8 @@ FEWEST = 60  # rows that the log of a moving rig needs
 FEWEST_STILL = 8  # readings per channel that a vessel's log needs
 MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
-END = 0.1  # share of the stroke that a moving rod leaves; a tenth is another unit
+END = 0.1  # share of the stroke within which a moving rod may be one in another unit
+SHARE = 0.2  # travel, as a share of the farthest place, from which a rod moves
 UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
@@ -115,14 +116,20 @@ def _time(log: Trajectory) -> Iterator[KembaError]:
     if span < limits.shortest:
         expected = f"at least {limits.shortest} s were expected"
         yield _log_fault(log, f"lasts {span:.3f} s", expected)
-    step = float(np.median(np.diff(t)))
-    if step > limits.slowest:
-        in_ms = step > limits.milliseconds
-        hint = "is the time in milliseconds?" if in_ms else "a chamber fills within 8 ms"
-        expected = f"at least {1.0 / limits.slowest:.0f} rows a second"
-        yield _log_fault(log, f"has a row every {step:.3g} s", expected, hint)
-    elif span > limits.gaps * len(t):
+    faults = list(_seldom(log, limits.slowest))
+    yield from faults
+    if not faults and span > limits.gaps * len(t):
         yield _log_fault(log, "has gaps longer than all of its rows", column=TIME)
+
+
+def _seldom(log: Trajectory, slowest: float) -> Iterator[KembaError]:
+    """Rows that are farther apart than `slowest` [s]."""
+    step = float(np.median(np.diff(log.time)))
+    if step > slowest:
+        in_ms = step > GateSettings.milliseconds
+        hint = "is the time in milliseconds?" if in_ms else "a chamber fills within 8 ms"
+        expected = f"at least {1.0 / slowest:.0f} rows a second"
+        yield _log_fault(log, f"has a row every {step:.3g} s", expected, hint)
 
 
 def _cells(log: Trajectory) -> Iterator[KembaError]:
@@ -248,6 +255,15 @@ def _travel(y: Array) -> float:
 def _remarks(log: Trajectory) -> Iterator[str]:
     name = log.meta["name"]
     yield from (f"{name}: {said}" for said in log.meta.get("read", ()))
+    if "piston/x" in log:
+        x, stroke = log["piston/x"], log.meta.get("stroke", 0.0)
+        farthest = float(np.nanmax(np.abs(x)))
+        if farthest < END * stroke and _travel(x) > SHARE * farthest:
+            yield (
+                f"{name}: piston/x stays within {1e3 * farthest:.3g} mm of the retracted end, of a "
+                f"stroke of {1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong "
+                "(see --map), and rates of frictions with it"
+            )
     gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
     if gaps.any():
         yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
@@ -285,7 +301,8 @@ def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
 
 def _rig_time(log: Trajectory) -> Iterator[KembaError]:
     vessel = log.meta["kind"] == "vessel"
-    yield from _clock(log, FEWEST_STILL if vessel else FEWEST)
+    faults = list(_clock(log, FEWEST_STILL if vessel else FEWEST))
+    yield from faults or ([] if vessel else _seldom(log, GateSettings.milliseconds))
 
 
 def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
@@ -309,11 +326,6 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
             what = f"moves by {1e3 * _travel(y):.4g} mm"
             expected = f"a stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
             yield _log_fault(log, what, expected, "is its unit wrong? See --map", column=name)
-        elif name == "piston/x" and np.nanmax(np.abs(y)) < END * log.meta["stroke"]:
-            what = f"stays within {1e3 * np.nanmax(np.abs(y)):.3g} mm of the retracted end"
-            expected = f"motion along the stroke of {1e3 * log.meta['stroke']:.4g} mm was expected"
-            hint = "its unit is wrong (see --map), or the rod must be moved farther"
-            yield _log_fault(log, what, expected, hint, column=name)
 
 
 def _rig_excitation(log: Trajectory) -> Iterator[KembaError]:

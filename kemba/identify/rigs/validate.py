@@ -21,6 +21,7 @@ ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
 # factor from which a gain is another unit, and no other inertia: the closest usual units, feet and
 # metres, have 3.28
 UNIT = 3.0
+TIME = "the time"
 SIZES = np.linspace(-9.0, 9.0, 33)  # logarithms of those that are tried first
 
 
@@ -34,10 +35,13 @@ def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[Ke
         return float(np.linalg.norm(force / sigma))
 
     def left(trial: RigLog) -> float:
-        """The share of the force that friction and damping of any size leave: every rig may have
-        these."""
-        friction = side * np.stack([np.tanh(trial.speed / still), trial.speed], axis=1)
-        return float(nnls(friction / sigma[:, None], gap(trial) / sigma)[1]) / size(trial)
+        """The share of the force that friction and damping of any size leave, which every rig may
+        have, and of a drive a zero of its force."""
+        known = [side * np.tanh(trial.speed / still), side * trial.speed]
+        if not model.mechanism.bore:
+            known += [np.ones(len(sigma)), -np.ones(len(sigma))]
+        columns = np.stack(known, axis=1) / sigma[:, None]
+        return float(nnls(columns, gap(trial) / sigma)[1]) / size(trial)
 
     small = SMALL * np.sqrt(len(sigma)) / size(log)
     if left(log) < small:
@@ -68,7 +72,9 @@ def mix_ups(
             moved = f"{place} counts from another zero (`offset: {np.degrees(zero):+.1f} deg`)"
             if abs(zero) > LEAST:
                 yield (*texts, moved), _moved(trial, 1.0, zero, others)
-        for name in () if said else (answer,) if bore else (place, answer):
+        if not bore and turned > 0.0:
+            yield (*texts, f"{place} and {answer} are swapped"), _exchanged(trial, answer)
+        for name in () if said else (answer,) if bore else (place, answer, TIME):
             size = _best(SIZES, partial(_scaled, trial, name), left)
             times = np.exp(abs(size))
             if times > UNIT:
@@ -98,11 +104,22 @@ def _moved(log: RigLog, gain: float, zero: float, others: dict[str, Array]) -> R
 
 
 def _scaled(log: RigLog, name: str, size: float) -> RigLog:
-    """A log with exp(size) times the readings of one channel."""
-    gain, others = float(np.exp(size)), log.channels.others
+    """A log with exp(size) times the readings of one channel, or times as long."""
+    gain, c, others = float(np.exp(size)), log.channels, log.channels.others
+    if name == TIME:
+        rates = {"v": c.v / gain, "quick": c.quick / gain, "a": c.a / gain**2}
+        return replace(log, channels=replace(c, time=gain * c.time, width=gain * c.width, **rates))
     if name in others:
         return _moved(log, 1.0, 0.0, {**others, name: gain * others[name]})
     return _moved(log, gain, 0.0, others)
+
+
+def _exchanged(log: RigLog, answer: str) -> RigLog:
+    """A log with the readings of position and force exchanged."""
+    c, q = log.channels, log.channels.others[answer]
+    v = np.gradient(q, c.time)
+    rates = {"v": v, "quick": v, "a": np.gradient(v, c.time)}
+    return replace(log, channels=replace(c, others={**c.others, answer: c.q}, q=q, read=q, **rates))
 
 
 def _best(

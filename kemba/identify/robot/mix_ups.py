@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, islice
 from typing import Any
 
 import numpy as np
@@ -155,12 +155,14 @@ TURNED = "body/pitch has the reversed sign (nose up is positive)"
 
 def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
     """Mistakes of one kind each, effects that may look alike, and how to put each right."""
-    yield from slight(legs)
+    yield from islice(slight(legs), 3)  # not two of them together
     yield _each("body/pitch is in degrees", ["body/pitch"], np.radians)
+    yield _unit("body/pitch", ["body/pitch"])
+    yield _unit("body/x", ["body/x"])
+    yield _unit("body/z", ["body/z"])
     yield _zero("body/pitch counts from another zero", ["body/pitch"])
     text = "body/pitch has the reversed sign and another zero"
     yield _zero(text, ["body/pitch"], -1.0, plain=TURNED)
-    yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
     yield _zero("body/z counts from another zero", ["body/z"])
     yield _zero("body/z counts downwards from a zero", ["body/z"], -1.0)
     for name in (
@@ -174,6 +176,8 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
         hips, torques, pistons = (
             [f"{leg}/{x}" for leg in some] for x in ("hip/q", "hip/tau", "piston/x")
         )
+        yield _unit(f"hip/q of {whose}", hips)
+        yield _unit(f"piston/x of {whose}", pistons)
         for start in (0.0, QUARTER, -QUARTER, 2 * QUARTER):
             yield _zero(f"hip/q of {whose} counts from another zero", hips, 1.0, start)
         for also, said in (([], "hip/q of {} has"), (torques, "hip/q and hip/tau of {} have")):
@@ -192,6 +196,7 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
         columns = ("hip/q", "hip/tau", "piston/x", "valve/extend", "valve/retract")
         pairs = [(f"{legs[0]}/{x}", f"{legs[1]}/{x}") for x in columns]
         yield _swap("hip/q of the legs is swapped", pairs[0])
+        yield _swap("hip/q and hip/tau of the legs are swapped", *pairs[:2])
         yield _swap("the legs are swapped", *pairs)
         text = (
             "body/x and body/pitch have the reversed sign and the legs are swapped (the robot is "
@@ -202,10 +207,11 @@ def mix_ups(legs: Sequence[str], stroke: float) -> Iterator[MixUp]:
 
 
 def slight(legs: Sequence[str]) -> Iterator[MixUp]:
-    """Those of them that move feet by millimetres only in a motion that is even and upright; both
-    together leave feet nearly where they are."""
+    """Those of them that move feet by millimetres only in a motion that is even and upright; a
+    turned pitch and swapped pistons together leave feet nearly where they are."""
     pitch = _each(TURNED, ["body/pitch"], np.negative)
     yield pitch
+    yield _each("body/x has the reversed sign (forward is positive)", ["body/x"], np.negative)
     if len(legs) == 2:
         pistons = _swap(
             "piston/x of the legs is swapped", (f"{legs[0]}/piston/x", f"{legs[1]}/piston/x")
@@ -293,6 +299,13 @@ def _zero(
         )
 
     return replace(at(0.0), at=at, reach=reach)
+
+
+def _unit(what: str, names: Sequence[str]) -> MixUp:
+    """An angle that was taken for degrees, a length for another unit."""
+    angle = names[0].endswith(("pitch", "hip/q"))
+    text = f"{what} is {57 if angle else 10} times too small (its unit is wrong)"
+    return _each(text, names, np.degrees if angle else lambda x: 10.0 * x)
 
 
 def _scale(name: str) -> MixUp:

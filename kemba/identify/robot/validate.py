@@ -29,6 +29,7 @@ from kemba.identify.robot.state import LinearisedState
 HINT = "correct it in a column map (--map)"
 BETTER = 2.0  # factor by which a log must err less without a mistake about its commands
 WHOLE = 1.2  # what the model leaves of a flight whose columns are right: zeros leave more
+NOISE = 0.75  # what it leaves of a log of a model that is complete
 SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was smoothed with it
 
 
@@ -40,8 +41,8 @@ def mixed_commands(
     tell nothing, about any column: `errs` tells what the model leaves of another log."""
     physics, logs = state.physics, state.batch.resampled
     before, found = [rms(r[rows.run == i]) for i in range(len(logs))], False
-    if max(before) < BETTER:
-        return  # noise alone leaves one
+    if max(before) < BETTER * NOISE:
+        return
     for some in (1, 2):
         left = {}
         for mistakes in combinations(command_mix_ups(physics.legs), some):
@@ -75,9 +76,13 @@ def slightly_mixed_up(
     as_read, known = left(*logs), slight(physics.legs)
     after = {m.text: left(*(corrected(log, physics, [m]) for log in logs)) for m in known}
     for i, log in enumerate(logs):
-        least = min(error[i] for error in after.values())
+        told = {text: float(error[i]) for text, error in after.items()}
+        least = min(told.values())
         if SAME * least < as_read[i] and least < BETTER:
-            said = "; or ".join(text for text, error in after.items() if error[i] <= SAME * least)
+            rivals = command_mix_ups(physics.legs)
+            told |= {m.text: float(left(corrected(log, physics, [m]))[0]) for m in rivals}
+            least = min(told.values())
+            said = "; or ".join(text for text, error in told.items() if error <= SAME * least)
             what = (
                 f"the log errs by {as_read[i]:.2g} times its noise, and by {least:.2g} times then"
             )
@@ -131,7 +136,7 @@ def _sunk(state: LinearisedState, run: int) -> Iterator[KembaError]:
             far = f"{1e3 * depth[at]:.0f} mm below the ground at {log.time[at]:.3f} s"
             what = f"the {leg} foot would be {far}"
             angles = f"body/pitch, {leg}/hip/q or {leg}/piston/x"
-            hint = f"is a sign or a zero of body/z, {angles} wrong, or are columns swapped?"
+            hint = f"is a sign, a zero or a unit of body/z, {angles} wrong, or are columns swapped?"
             yield KembaError(log.name, what, "a foot on or above it was expected", hint)
 
 

@@ -17,6 +17,7 @@ UNITS = {"m": "piston/x", "N": "piston/F"}
 SWAPPED = {"valve/extend": ("valve/retract", 1.0, 0.0), "valve/retract": ("valve/extend", 1.0, 0.0)}
 OFF = {name: (name, -1.0, 1.0) for name in SWAPPED}
 TURNED, END = {"piston/F": ("piston/F", -1.0, 0.0)}, {"piston/x": ("piston/x", -1.0, STROKE)}
+TENTH = {"piston/x": ("piston/x", 0.1, 0.0)}
 # mistakes: column -> the one it is read from, sign and zero; and words of each
 MISTAKES: dict[str, tuple[dict[str, tuple[str, float, float]], str]] = {
     "force": (TURNED, r"piston/F has the reversed sign \(pushing is positive\); the"),
@@ -42,6 +43,19 @@ MISTAKES: dict[str, tuple[dict[str, tuple[str, float, float]], str]] = {
         TURNED | END | SWAPPED,
         "are swapped and .* extended end .* and piston/F has the reversed sign",
     ),
+    "off, and a zero": (
+        OFF | {"piston/F": ("piston/F", 1.0, 60.0)},
+        r"are inverted \(1 is on\) and piston/F counts from another zero \(`offset: -(59|60)",
+    ),
+    "valves and a zero": (
+        SWAPPED | {"piston/F": ("piston/F", 1.0, 60.0)},
+        r"are swapped and piston/F counts from another zero \(`offset: -(59|60)",
+    ),
+    "decimetres, valves and force": (
+        SWAPPED | TURNED | TENTH,
+        r"are swapped and piston/x is 10 times too small .* and piston/F has the reversed sign",
+    ),
+    "decimetres": (TENTH, r"run_0: piston/x is 10 times too small \(its unit is wrong\); the"),
     "kilonewtons": (
         {"piston/F": ("piston/F", -1e-3, 0.0)},
         r"run_0: piston/F has the reversed sign .* and piston/F seems to be in kN; the force",
@@ -65,12 +79,16 @@ def corrected(log: Trajectory, said: str) -> Trajectory:
     for names in re.findall(r"([\w/ ]+) (?:is|are) inverted", said):
         off = {name for name in SWAPPED if name in names}
         change |= {a: (change.get(a, OFF[a])[0], -1.0, 1.0) for a in off}
+    if "piston/x is 10 times too small" in said:
+        change |= {"piston/x": ("piston/x", 10.0, 0.0)}
     if "extended end" in said:
         change |= END
     if "piston/F has the reversed sign" in said:
         change |= {"piston/F": ("piston/F", -1e3 if "in kN" in said else -1.0, 0.0)}
-    for name, number, unit in re.findall(r"(\S+) counts .{0,40}?offset: (\S+) (m?m|N)`", said):
-        change[name] = (name, -1.0, float(number) / (1e3 if unit == "mm" else 1.0))
+    moved = r"(\S+) counts .{0,25}?(sign: -1, )?offset: (\S+) (m?m|N)`"
+    for name, turned, number, unit in re.findall(moved, said):
+        zero = float(number) / (1e3 if unit == "mm" else 1.0)
+        change[name] = (name, -1.0 if turned else 1.0, zero)
     return taken(log, change)
 
 
@@ -83,6 +101,21 @@ def test_the_advice_once_followed_leaves_nothing(mistake: str, bench_log: BenchL
     again = bench_problem([corrected(log, str(fault))], model)
     again.validate()
     assert np.sqrt(np.mean(again.residual({}) ** 2)) < 1.2  # of the noise
+
+
+@pytest.mark.parametrize(
+    ("slower", "words"),
+    [(False, "correct it with `delay`"), (True, "is the unit of the time wrong")],
+)
+def test_a_delay_is_advised_only_where_it_explains_the_force(
+    slower: bool, words: str, bench_log: BenchLog
+) -> None:
+    """Of a log whose seconds are too long, chambers fill late and slowly."""
+    log, model = bench_log(), load_model(rig=True)
+    late = {"piston/F [N]": np.interp(log.time - 0.06, log.time, log["piston/F"])}
+    read = Trajectory(10.0 * log.time, log.columns, log.meta) if slower else log.with_columns(late)
+    (fault,) = bench_problem([read], model).contradictions
+    assert "ms late" in str(fault) and re.search(words, str(fault)), str(fault)
 
 
 def test_an_effect_is_no_mistake(bench_log: BenchLog) -> None:

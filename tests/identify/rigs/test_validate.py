@@ -9,7 +9,7 @@ import pytest
 from kemba.config import dump_yaml
 from kemba.identify.logs.gate import BadData
 from kemba.identify.rigs.problem import rig_problem
-from kemba.identify.workflow import discover_logs
+from kemba.identify.workflow import check_all, check_log, discover_logs
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -186,7 +186,6 @@ def test_a_seal_rubs_against_the_motion_and_tells_the_end(tmp_path: Path) -> Non
     [
         ("piston/x [m]", 10.0, r"moves by 599.9 mm; a stroke of 120 mm was expected; is its unit"),
         ("piston/x [m]", 39.37, "moves by .* is its unit wrong"),
-        ("piston/x [m]", 0.1, "within 9 mm of the retracted end; motion along .*unit is wrong"),
         ("piston/F [N]", 1 / 4.448, r"piston/F is about 4.\d times too small .its unit is wrong"),
         ("chamber/retract/P [Pa]", 1.6, "gain of chamber/retract/P would be off"),
     ],
@@ -198,6 +197,48 @@ def test_another_unit_is_no_effect(column: str, factor: float, words: str, tmp_p
     Trajectory(TIME, {**read, column: factor * read[column]}, {"kind": "cylinder"}).write(log)
     answer, _ = discover_logs([log], (), str(tmp_path / "model.yaml"))
     assert not answer.writes and re.search(words, answer.sentence), answer.sentence
+
+
+@pytest.mark.parametrize("place", [0.06, 0.003])
+def test_a_small_motion_near_the_end_is_read_and_said(place: float, tmp_path: Path) -> None:
+    """A test of presliding looks like a test along the stroke in another unit."""
+    rig_of(tmp_path)
+    read, log = cylinder(12.0), tmp_path / "log.csv"
+    read["piston/x [m]"] = place + (read["piston/x [m]"] - 0.06) / 30.0
+    Trajectory(TIME, read, RUN).write(log)
+    _, remarks = check_log(log, str(tmp_path / "model.yaml"))
+    said = [line for line in remarks if "4 mm of the retracted end, of a stroke of 120 mm" in line]
+    assert len(said) == (place < 0.01) and all("its unit is wrong" in line for line in said)
+
+
+@pytest.mark.parametrize(
+    ("scale", "words"),
+    [
+        (1000.0, r"log: has a row every 2 s; at least 2 rows a second; is the time in millis"),
+        (100.0, r"log: the time is about (100|99) times too large \(its unit is wrong\); "),
+        (0.1, r"log: the time is about (10|9\.\d) times too small \(its unit is wrong\); the"),
+    ],
+)
+def test_another_unit_of_the_time_is_named(scale: float, words: str) -> None:
+    right = pendulum(Q, FORCE)
+    log = Trajectory(scale * TIME, right.columns, right.meta | {"name": "log"})
+    model = load_model("pendulum_rig")
+    with pytest.raises(BadData) as raised:
+        check_all([log], model)
+        rig_problem([log], model).validate()
+    assert re.search(words, str(raised.value)), str(raised.value)
+
+
+def test_a_drive_whose_columns_are_swapped_or_whose_force_has_a_zero_beside_a_sign() -> None:
+    model, right = load_model("pendulum_rig"), pendulum(Q, FORCE)
+    q, tau = right["axis/q"], right["axis/tau"]
+    assert rig_problem([pendulum(q, tau + 2.0)], model).validate() == []  # that is an effect
+    for log, words in (
+        (pendulum(tau, q), "run: axis/q and axis/tau are swapped; the"),
+        (pendulum(q, 2.0 - tau), "run: axis/tau has the reversed sign; or axis/q has the reversed"),
+    ):
+        with pytest.raises(BadData, match=words):
+            rig_problem([log], model).validate()
 
 
 def test_a_motor_of_another_unit_beside_a_heavier_axis_is_no_effect(tmp_path: Path) -> None:

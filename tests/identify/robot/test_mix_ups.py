@@ -69,6 +69,12 @@ def found(physics: Physics, log: ResampledLog) -> list[KembaError]:
 MISTAKES: dict[str, tuple[dict[str, Change], str]] = {
     "pitch": ({"pitch": np.negative}, "body/pitch has the reversed sign"),
     "degrees": ({"pitch": np.degrees}, "body/pitch is in degrees"),
+    "a unit of the pitch": ({"pitch": np.radians}, "stand: body/pitch is 57 times too small"),
+    "a unit of the height": ({"body__z": lambda z: z / 10}, r"stand: body/z is 10 times too small"),
+    "a unit of the pistons": (
+        {"piston__x": lambda x: x / 10},
+        r"stand: piston/x of every leg is 10 times too small \(its unit is wrong\); corrected",
+    ),
     "backwards": ({"body__x": np.negative}, "body/x has the reversed sign"),
     "zero": (
         {"hip__q": lambda q: q + QUARTER},
