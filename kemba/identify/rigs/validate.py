@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
@@ -107,7 +108,7 @@ def _scaled(log: RigLog, name: str, size: float) -> RigLog:
     """A log with exp(size) times the readings of one channel, or times as long."""
     gain, c, others = float(np.exp(size)), log.channels, log.channels.others
     if name == TIME:
-        rates = {"v": c.v / gain, "quick": c.quick / gain, "a": c.a / gain**2}
+        rates: dict[str, Any] = {"v": c.v / gain, "quick": c.quick / gain, "a": c.a / gain**2}
         return replace(log, channels=replace(c, time=gain * c.time, width=gain * c.width, **rates))
     if name in others:
         return _moved(log, 1.0, 0.0, {**others, name: gain * others[name]})
@@ -118,7 +119,7 @@ def _exchanged(log: RigLog, answer: str) -> RigLog:
     """A log with the readings of position and force exchanged."""
     c, q = log.channels, log.channels.others[answer]
     v = np.gradient(q, c.time)
-    rates = {"v": v, "quick": v, "a": np.gradient(v, c.time)}
+    rates: dict[str, Any] = {"v": v, "quick": v, "a": np.gradient(v, c.time)}
     return replace(log, channels=replace(c, others={**c.others, answer: c.q}, q=q, read=q, **rates))
 
 

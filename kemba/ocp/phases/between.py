@@ -81,6 +81,6 @@ def _at(program: PhaseProgram, view: View, g: ca.SX, share: float) -> tuple[ca.S
     q0, q1, v0, v1 = (scaled(layout, name[0], name) for name in ("q0", "q1", "v0", "v1"))
     h = ca.SX.sym("h")
     scale = {group: ca.DM(layout.scale[layout.slices[group]]) for group in "qv"}
-    ways = (h * STEP * v * scale["v"] / scale["q"] for v in (v0, v1))
-    q = cubic(q0, q1, *ways, share)
+    way0, way1 = (h * STEP * v * scale["v"] / scale["q"] for v in (v0, v1))
+    q = cubic(q0, q1, way0, way1, share)
     return ca.vertcat(q0, q1, v0, v1, h), ca.substitute(g, view.symbols["q"], q)

@@ -32,7 +32,8 @@ def begin_ways(meta: Mapping[str, Any], q: Array, way0: Array, way1: Array) -> A
     rise = np.diff(q, axis=0)
     if "phases" not in meta:
         return np.asarray(rise)
-    begin, hit = way0.copy(), _impacts(meta)
+    begin: Array = way0.copy()
+    hit = _impacts(meta)
     begin[hit] = 2 * rise[hit] - way1[hit]
     return begin
 
