@@ -127,7 +127,7 @@ PLANNING = [
     "refinement",
 ]
 PLANNING += ["continuation", "infeasibility", "planned", "planner", "finer"]
-PLANNING += ["planning"]
+PLANNING += ["raised", "planning"]
 
 
 def test_planning_is_built_from_the_bottom_up() -> None:

@@ -29,6 +29,7 @@ from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
 from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
+from kemba.ocp.raised import lowered, raised, rises
 from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
@@ -135,6 +136,8 @@ class Planning:
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
+            if not number and planner.start is None and rises(task):
+                yield from self._raised()
             only = planner.start is not None or task.refine != "radau"
             if only or not found.status.plan:
                 return
@@ -165,6 +168,19 @@ class Planning:
             found = found if why is None else explained(found, why)
         plain = found.plain and self._timed(self._clear(replace(found.plain, task=task)))
         return replace(self._timed(self._clear(found)), plain=plain)
+
+    def _raised(self) -> Iterator[Plan]:
+        """The plan from the first refined one on level ground from which the scene can rise to its
+        own; nothing where there is none."""
+        planner, document = self.planner, self.document
+        planner.session.tell("from level ground")
+        level = replace(self, planner=lowered(planner, document, 0.0))
+        for first in level.plans():
+            with self.clock.running():
+                found = raised(first, planner, document) if first.refined else None
+            if found is not None:
+                yield self._timed(self._clear(found))
+                return
 
     def _clear(self, found: Plan) -> Plan:
         asked = found.status is Status.SOLVED and self.planner.task.clearance

@@ -66,16 +66,38 @@ def test_the_same_plan_with_five_stages_an_element_executes_more_exactly() -> No
     assert plans[1].objective == pytest.approx(plans[0].objective, rel=0.02)
 
 
-@pytest.mark.parametrize("half", [True, False])
-def test_edges_are_near_and_in_order(half: bool) -> None:
+def edges(half: bool, borders: list[float], shortest: float, longest: float) -> np.ndarray:
+    """When four phases with a valve edge between each begin on ticks."""
     model = load_model("planning")
     reduction = find_symmetry(model) if half else whole(model.node)
     assert reduction is not None
     legs = 1 if half else 2
     patterns = [(1.0, 0.0), (0.0, 0.0), (0.0, 1.0), (1.0, 0.0)]
     phases = [Phase(i, i + 1, (), pattern * legs) for i, pattern in enumerate(patterns)]
-    borders = np.array([0.0, 0.1234, 0.1567, 0.1999])
-    found = edge_times(model, reduction, phases, borders)
+    limits = np.full(4, shortest), np.full(4, longest)
+    found = edge_times(model, reduction, phases, np.array([0.0, *borders]), *limits)
     assert list(found) == [1, 2, 3]
-    times = np.array(list(found.values()))
-    assert np.all(np.diff(times) > 0) and np.abs(times - borders[1:]).max() < PERIOD
+    return np.array(list(found.values()))
+
+
+@pytest.mark.parametrize("half", [True, False])
+def test_edges_are_near_and_in_order(half: bool) -> None:
+    borders = [0.1234, 0.1567, 0.1999]
+    times = edges(half, borders, 0.0, 1.0)
+    assert np.all(np.diff(times) > 0) and np.abs(times - borders).max() < PERIOD
+
+
+@pytest.mark.parametrize(
+    ("borders", "shortest", "longest"),
+    [
+        ([0.1234, 0.12375, 0.1242], 3e-4, 1.0),  # three edges within a tick
+        ([0.0196, 0.0396, 0.0596], 0.0, 0.02),  # phases that are as long as they may be
+    ],
+)
+def test_edges_leave_phases_durations_that_they_may_have(
+    borders: list[float], shortest: float, longest: float
+) -> None:
+    times = edges(True, borders, shortest, longest)
+    lasts = np.diff(times, prepend=0.0)
+    assert np.all(lasts >= shortest - 1e-9) and np.all(lasts <= longest + 1e-9)
+    assert np.abs(times - borders).max() < 3 * PERIOD

@@ -21,12 +21,13 @@ from kemba.model import Model
 from kemba.ocp.task.expressions import along
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.course import begin_ways, cubic
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.unilateral import rigid_constraints
 from kemba.trajectory import Array, Trajectory
 
-BETWEEN = 4  # places in every interval at which bounds are looked at
+BETWEEN = 8  # parts of every interval at which bounds are looked at
 CLOSED = 1e-6  # m; a smaller gap touches
 EULER_SPEED = 0.01  # m/s; what of an impact's speed the row of a step leaves open
 
@@ -200,9 +201,7 @@ class _Course:
 
     @classmethod
     def of(cls, model: Model, requirements: Iterable[Requirement], plan: Trajectory) -> _Course:
-        """The requirements' lengths and angles on every interval, whose coordinates lie on the
-        parabola through both ends with the rate at its end. That is the line of implicit Euler,
-        and it knows of no impact at the beginning."""
+        """The requirements' lengths and angles on every interval, whose coordinates are cubics."""
         node = model.node
         wanted = {
             r.quantity.name: quantity_expression(model, r.quantity.name)
@@ -215,9 +214,9 @@ class _Course:
             return cls(np.zeros(0), {})
         x, h = arrays(model, plan), np.diff(plan.time)[:, None]
         share = np.arange(1, BETWEEN) / BETWEEN
-        q0, q1, w1 = x["q"][:-1], x["q"][1:], x["v"][1:]
-        bend = q0 - q1 + h * w1
-        q = [q1 - h * w1 * (1 - s) + bend * (1 - s) ** 2 for s in share]
+        q0, q1, end = x["q"][:-1], x["q"][1:], h * x["v"][1:]
+        begin = begin_ways(plan.meta, x["q"], h * x["v"][:-1], end)
+        q = [cubic(q0, q1, begin, end, s) for s in share]
         time = [plan.time[:-1] + s * h[:, 0] for s in share]
         f = ca.Function("course", [node.q], [ca.densify(ca.vertcat(*kept.values()))])
         rows = np.concatenate(q)

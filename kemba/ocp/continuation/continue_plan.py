@@ -8,6 +8,7 @@ edges on ticks beforehand the plan is the best one that a table can hold.
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import NamedTuple
 
 import casadi as ca
@@ -21,6 +22,7 @@ from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -148,6 +150,8 @@ class Continuation:
         if self.origin.finer and kept is not None:
             program, kept = refiner.carried(RADAU9, program, kept)
         x = with_impacts(program, x, Continuing.ease) if kept is None else kept
+        if not self.task.scene.even:
+            add_missed(program, x, Refining.near_rows)
         if self.origin.ticks:
             on_ticks(program, x)
         begin = Iterate(x)
@@ -169,9 +173,8 @@ class Continuation:
 
     def _read_anew(self, start: Trajectory) -> Refined:
         self.tell(f"from {self.origin.name}: its phases read anew")
-        found = refine(
-            self.model, self.task, self.requirements, start, control=self.control, tell=self.tell
-        )
+        known = self.model, self.task, self.requirements, start
+        found = refine(*known, self.control, self.tell, pulses=False)  # the plan has its own
         self.steps.append(Attempt("phases read anew", found.ending, found.iterations))
         return found
 
@@ -268,17 +271,27 @@ def _resampled(plan: Trajectory, phases: Sequence[Phase], counts: Sequence[int])
     return Trajectory(np.concatenate(clocks), joined, plan.meta)
 
 
-def edge_times(
-    model: Model, reduction: Reduction, phases: Sequence[Phase], borders: np.ndarray
-) -> dict[int, float]:
-    """When [s] phases that begin with a valve edge should begin, so that all edges are on ticks.
+ROUNDING = 1e-6  # of a tick, by which durations on their bounds are off
 
-    `borders` (phases,): when they begin now; the first one stays at 0. Where edges of one moment
+
+def edge_times(
+    model: Model,
+    reduction: Reduction,
+    phases: Sequence[Phase],
+    borders: np.ndarray,
+    shortest: np.ndarray,
+    longest: np.ndarray,
+) -> dict[int, float]:
+    """When [s] phases that begin with a valve edge should begin, so that all edges are on ticks and
+    the phases between two of them can last that long.
+
+    `borders` (phases,): when they begin now; the first one stays at 0. `shortest`, `longest`
+    (phases,): how long [s] they may last. Where edges of one moment
     have dead times that are no whole ticks apart, the first valve decides.
     """
     valves, edges, owners = _valves(model, reduction), [], []
-    longest = max(max(model.timing(leg)) for leg in model.mechanism.legs)
-    lead = float(np.ceil(longest / PERIOD))  # commands come before what they do
+    dead_times = [time for leg in model.mechanism.legs for time in model.timing(leg)]
+    lead = float(ceil(max(dead_times) / PERIOD))  # commands come before what they do
     for j, (leg, force) in enumerate(valves):
         dead = model.timing(model.mechanism.legs[leg])
         before = 0.0
@@ -296,6 +309,13 @@ def edge_times(
         for (p, late), tick in zip(own, chosen, strict=True):
             if p:
                 found.setdefault(p, (tick - lead) * PERIOD + late)
+    before, last = 0, 0.0
+    for p, time in sorted(found.items()):
+        least, most = (last + each[before:p].sum() for each in (shortest, longest))
+        later = ceil(max(0.0, least - time) / PERIOD - ROUNDING)
+        sooner = ceil(max(0.0, time - most) / PERIOD - ROUNDING)
+        before, last = p, time + (later - sooner) * PERIOD
+        found[p] = last
     return dict(sorted(found.items()))
 
 
@@ -312,9 +332,10 @@ def on_ticks(program: PhaseProgram, x: np.ndarray) -> None:
     """Add the rows that keep the valve edges of a program on ticks, rounded from those of x
     (size,)."""
     h, phases = program.columns.h[:, 0], program.phases
-    lasts = np.array([phase.elements * x[h[p]] * STEP for p, phase in enumerate(phases)])
+    elements = np.array([phase.elements for phase in phases])
+    lasts, *limits = (elements * at[h] * STEP for at in (x, program.lower, program.upper))
     borders = np.concatenate([[0.0], np.cumsum(lasts)[:-1]])
-    for p, time in edge_times(program.model, program.reduction, phases, borders).items():
+    for p, time in edge_times(program.model, program.reduction, phases, borders, *limits).items():
         z = ca.SX.sym("h", p)
         begins = ca.dot(z, ca.DM([phase.elements for phase in phases[:p]]))
         program.add("valve edge", z, begins, time / STEP, time / STEP, [h[:p]])

@@ -16,9 +16,10 @@ from kemba.ocp.phases.modes import OPEN
 from kemba.ocp.phases.program import PhaseProgram, View
 from kemba.ocp.phases.radau import scaled
 from kemba.ocp.task.requirement import SCALES, quantity_expression
+from kemba.ocp.transcription.course import cubic
 from kemba.ocp.transcription.layout import STEP
 
-SHARES = (0.25, 0.5, 0.75)  # of an element: where the certificate looks
+SHARES = tuple(k / 8 for k in range(1, 8))  # of an element: where the certificate looks
 HALF = 0.5  # of what it allows there: what is missed by more is asked for
 
 
@@ -41,8 +42,10 @@ def add_missed(program: PhaseProgram, x: np.ndarray, within: float = 0.0) -> boo
     for asked in list(_along(program, view)):
         for share in SHARES:
             z, g = _at(program, view, asked.g, share)
-            ends = ((c.end(e), c.end(e + 1), c.h[c.phase_of[e]]) for e in asked.elements)
-            columns = np.array([np.concatenate([a["q"], b["q"], b["v"], h]) for a, b, h in ends])
+            ends = ((c.begin(e), c.end(e + 1), c.h[c.phase_of[e]]) for e in asked.elements)
+            columns = np.array(
+                [np.concatenate([a["q"], b["q"], a["v"], b["v"], h]) for a, b, h in ends]
+            )
             f = ca.Function("g", [z], [ca.densify(g)])
             values = np.array(f.map(len(columns))(x[columns].T)).ravel()
             over = np.maximum(asked.low - values, values - asked.high)
@@ -72,12 +75,12 @@ def _along(program: PhaseProgram, view: View) -> Iterator[Along]:
 
 
 def _at(program: PhaseProgram, view: View, g: ca.SX, share: float) -> tuple[ca.SX, ca.SX]:
-    """g at a share of an element, as a function of z: coordinates at both ends, rates at its end,
-    duration. The coordinates lie on the parabola through these, as the certificate has it."""
+    """g at a share of an element, as a function of z: coordinates and rates at both ends, duration.
+    The coordinates lie on cubics through these, as the certificate has them."""
     layout = program.layout
-    q0, q1, v1 = (scaled(layout, name[0], name) for name in ("q0", "q1", "v1"))
-    h, left = ca.SX.sym("h"), 1.0 - share
+    q0, q1, v0, v1 = (scaled(layout, name[0], name) for name in ("q0", "q1", "v0", "v1"))
+    h = ca.SX.sym("h")
     scale = {group: ca.DM(layout.scale[layout.slices[group]]) for group in "qv"}
-    step = h * STEP * v1 * scale["v"] / scale["q"]
-    q = q1 - left * step + left**2 * (q0 - q1 + step)
-    return ca.vertcat(q0, q1, v1, h), ca.substitute(g, view.symbols["q"], q)
+    way0, way1 = (h * STEP * v * scale["v"] / scale["q"] for v in (v0, v1))
+    q = cubic(q0, q1, way0, way1, share)
+    return ca.vertcat(q0, q1, v0, v1, h), ca.substitute(g, view.symbols["q"], q)

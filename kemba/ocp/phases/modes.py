@@ -4,7 +4,6 @@ Phases are also written as texts, which a run keeps so that another plan can sta
 """
 
 import itertools
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -15,6 +14,7 @@ import numpy as np
 from kemba.events import runs
 from kemba.model import Model
 from kemba.ocp.phases.settings import Reading
+from kemba.ocp.transcription.course import OPENED, PHASE
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.unilateral import Constraint
 from kemba.trajectory import Trajectory
@@ -147,9 +147,8 @@ def _listed(value: object) -> list[ca.DM]:
     return list(value) if isinstance(value, tuple | list) else [value]  # type: ignore[list-item]
 
 
-LETTERS = {OPEN: "o", HELD: "h", AHEAD: "a", BACK: "b"}
+LETTERS = {OPEN: OPENED, HELD: "h", AHEAD: "a", BACK: "b"}
 MODES = {letter: mode for mode, letter in LETTERS.items()}
-PHASE = re.compile(r"(\d+)-(\d+) ([ohab]*) ([01]*)")
 
 
 def phase_notes(phases: Sequence[Phase], constraints: Sequence[Constraint]) -> dict[str, Any]:

@@ -97,16 +97,18 @@ def refine(
     plan: Trajectory,
     control: Control | None = None,
     tell: Tell = silent,
+    pulses: bool = True,
 ) -> Refined:
     """The plan solved again with its modes kept and the durations of its phases free.
 
     It is solved by half the robot where plan and task allow it. `tell` gets the name of every
-    solve.
+    solve. `pulses`: of valves are put in where they lower the cost.
     """
     reduction = reduction_of(model, task, requirements, plan)
     refiner = Refiner(model, task, requirements, plan, reduction, control or Control(), tell)
     try:
-        return refiner.run()
+        found = refiner.run()
+        return refiner.improved(found) if pulses else found
     except ContradictionError as error:
         return Refined(None, None, Ending.UNSUITABLE, refiner.iterations, reason=str(error))
     except ValueError as error:
@@ -150,7 +152,7 @@ class Refiner:
                 found = self.repair(phases, found)
             if found.done:
                 break
-        return replace(self.improved(found), iterations=self.iterations)
+        return replace(found, iterations=self.iterations)
 
     def phases(self, trim: bool = False) -> list[Phase]:
         """The phases of the plan; see `read_phases`. Raises ValueError for a model to which the
@@ -171,8 +173,8 @@ class Refiner:
         best = with_pulses(self.solution, lambda p: self.build(p, start, scheme)[0], self.control)
         if best is self.solution:
             return found
-        made = read(*best)
-        return replace(made, plain=found) if self._keeps(made) else found
+        made = replace(read(*best), plain=found, iterations=self.iterations)
+        return made if self._keeps(made) else found
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended.
@@ -276,12 +278,12 @@ class Refiner:
     def carried(
         self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The exact program with a scheme and its start (size,), from a solution of another. One
-        with the most stages begins at an exact solution: with rows between nodes where that is near
-        to what it keeps off."""
+        """The exact program with a scheme and its start (size,), from a solution of another: with
+        rows between nodes where that is near to what it keeps off, where there are corners to be
+        cut, or most stages, which begin at an exact solution."""
         program, _ = self.build(other.phases, self.plan, scheme)
         start = carried(program, other.columns, other.scheme.points, x)
-        if scheme is RADAU9:
+        if scheme is RADAU9 or not self.task.scene.even:
             add_missed(program, start, Refining.near_rows)
         return program, start
 

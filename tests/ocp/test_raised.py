@@ -1,0 +1,88 @@
+"""A plan in a scene from one on level ground: how its steps go, and when it is tried."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from kemba.ocp import raised
+from kemba.ocp.planning import Planning
+from kemba.ocp.reading import load_task
+
+HIGHEST = 0.6  # of the scene, in the stiff example: beyond, only small steps are solved
+
+
+def steps_of(
+    monkeypatch: pytest.MonkeyPatch, widest: Any, over: int = 1000
+) -> tuple[list[float], Any]:
+    """The shares that are tried where a step from `share` is solved if it is no wider than
+    `widest(share)`, and what comes of it. `over`: tries after which time is over."""
+    tried: list[float] = []
+    solved = [0.0]
+
+    def continued(share: Any, origin: Any) -> tuple[Any, str]:
+        tried.append(share)
+        if share - solved[-1] > widest(solved[-1]):
+            return None, "no solution near"
+        solved.append(share)
+        plan = SimpleNamespace(trajectory=None, model=None, requirements=(), stages=None)
+        return plan, ""
+
+    ended = SimpleNamespace(ended=lambda: len(tried) >= over)
+    planner: Any = SimpleNamespace(
+        session=SimpleNamespace(control=ended, tell=lambda _: None), lags=None
+    )
+    monkeypatch.setattr(raised, "continued", continued)
+    monkeypatch.setattr(raised, "lowered", lambda planner, document, share: share)
+    monkeypatch.setattr(raised, "replace", lambda plan, **new: SimpleNamespace(**new))
+    first: Any = SimpleNamespace(trajectory=None, model=None, requirements=(), stages=None)
+    return tried, raised.raised(first, planner, SimpleNamespace())  # type: ignore[arg-type]
+
+
+def test_steps_double_where_they_are_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried, found = steps_of(monkeypatch, lambda share: 1.0)
+    assert tried == [0.125, 0.375, 0.875, 1.0]
+    assert found.start == "level ground"
+
+
+def test_steps_halve_where_they_are_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried, found = steps_of(monkeypatch, lambda share: 0.1 if share > HIGHEST else 0.3)
+    assert found is not None and tried[-1] == 1.0
+    assert 0.875 in tried and 0.625 in tried
+
+
+def test_there_is_no_plan_where_no_small_step_is_solved(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried, found = steps_of(monkeypatch, lambda share: 0.0 if share > HIGHEST else 1.0)
+    assert found is None
+    assert tried[-1] - 0.875 == pytest.approx(raised.LEAST)
+
+
+def test_there_is_no_plan_where_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert steps_of(monkeypatch, lambda share: 1.0, over=2)[1] is None
+
+
+@pytest.mark.parametrize(
+    ("task", "settings", "rises"),
+    [
+        ("platform.yaml", [], True),
+        ("hurdle.yaml", [], True),
+        ("hurdle.yaml", ["refine=none"], False),
+        ("jump.yaml", [], False),
+        ("double_jump.yaml", [], False),
+    ],
+)
+def test_scenes_rise_where_there_is_one(task: str, settings: list[str], rises: bool) -> None:
+    assert raised.rises(load_task(task, settings)[0]) is rises
+
+
+def test_the_plan_on_level_ground_has_no_walls() -> None:
+    planning = Planning.of(*load_task("platform.yaml"))
+    level = raised.lowered(planning.planner, planning.document, 0.0)
+    assert level.model.mechanism.scene.ground.level == 0.0
+    asked = [
+        {r.quantity.name for r in one.requirements if "/distance" in r.quantity.name}
+        for one in (planning.planner, level)
+    ]
+    assert asked[0] and not asked[1]
+    low = raised.lowered(planning.planner, planning.document, 0.5)
+    assert low.model.mechanism.scene.ground.height(0.6) == pytest.approx(0.075)
