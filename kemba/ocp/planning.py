@@ -136,7 +136,8 @@ class Planning:
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
-            if not number and planner.start is None and rises(task):
+            free = planner.start is None and not self.refused and not self.over
+            if number == 0 and free and rises(task):
                 yield from self._raised()
             only = planner.start is not None or task.refine != "radau"
             if only or not found.status.plan:

@@ -25,7 +25,11 @@ LEAST = 1 / 64  # a smaller step is not tried: 2 mm of a wall of 15 cm
 
 def rises(task: Task) -> bool:
     """Whether there is a level ground from which the scene of a task rises."""
-    return task.refine == "radau" and not task.sequence and not task.scene.even
+    scene = task.scene
+    shaped = scene.ground.level is None or scene.obstacles
+    if not shaped or task.sequence or task.refine != "radau":
+        return False
+    return scene.lowered(0.0, task.place_x).ground.level is not None
 
 
 def raised(found: Plan, planner: Planner, document: Document) -> Plan | None:

@@ -43,7 +43,8 @@ class Terrain(Section):
         return None
 
     def lowered(self, share: float, base: float) -> Terrain:
-        """The line with a `share` of its heights above `base` [m]."""
+        """The line with a `share` of its heights above `base` [m]; as it is where a kind has none,
+        and then no plan is sought from level ground."""
         return self
 
     def dump(self) -> dict[str, Any]:
@@ -360,6 +361,11 @@ class Scene(Section):
         """Whether every place of it is like every other."""
         friction = any(t.friction is not None and t.begin is not None for t in self.terrain)
         return self.ground.level is not None and not self.obstacles and not friction
+
+    @property
+    def cornered(self) -> bool:
+        """Whether there are walls or obstacles, whose corners a motion may cut."""
+        return bool(self.obstacles) or len(self.ground.stretches) > 1
 
     def lowered(self, share: float, x: float) -> Scene:
         """The scene with a `share` of its heights above the ground at x [m]; with none there are no

@@ -13,15 +13,18 @@ HIGHEST = 0.6  # of the scene, in the stiff example: beyond, only small steps ar
 
 
 def steps_of(
-    monkeypatch: pytest.MonkeyPatch, widest: Any, over: int = 1000
-) -> tuple[list[float], Any]:
+    monkeypatch: pytest.MonkeyPatch, widest: Any, over: int = 1000, lags: bool = False
+) -> tuple[list[Any], Any]:
     """The shares that are tried where a step from `share` is solved if it is no wider than
-    `widest(share)`, and what comes of it. `over`: tries after which time is over."""
-    tried: list[float] = []
+    `widest(share)`, and what comes of it. `over`: tries after which time is over. `lags`: plans are
+    sought on another model."""
+    tried: list[Any] = []
     solved = [0.0]
 
     def continued(share: Any, origin: Any) -> tuple[Any, str]:
-        tried.append(share)
+        physical = share is planner
+        tried.append("physical" if physical else share)
+        share = 1.0 if physical else share
         if share - solved[-1] > widest(solved[-1]):
             return None, "no solution near"
         solved.append(share)
@@ -30,7 +33,7 @@ def steps_of(
 
     ended = SimpleNamespace(ended=lambda: len(tried) >= over)
     planner: Any = SimpleNamespace(
-        session=SimpleNamespace(control=ended, tell=lambda _: None), lags=None
+        session=SimpleNamespace(control=ended, tell=lambda _: None), lags=lags or None
     )
     monkeypatch.setattr(raised, "continued", continued)
     monkeypatch.setattr(raised, "lowered", lambda planner, document, share: share)
@@ -57,6 +60,11 @@ def test_there_is_no_plan_where_no_small_step_is_solved(monkeypatch: pytest.Monk
     assert tried[-1] - 0.875 == pytest.approx(raised.LEAST)
 
 
+def test_physical_chambers_come_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried, found = steps_of(monkeypatch, lambda share: 1.0, lags=True)
+    assert found is not None and tried == [0.125, 0.375, 0.875, 1.0, "physical"]
+
+
 def test_there_is_no_plan_where_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
     assert steps_of(monkeypatch, lambda share: 1.0, over=2)[1] is None
 
@@ -68,6 +76,8 @@ def test_there_is_no_plan_where_time_is_over(monkeypatch: pytest.MonkeyPatch) ->
         ("hurdle.yaml", [], True),
         ("hurdle.yaml", ["refine=none"], False),
         ("jump.yaml", [], False),
+        ("jump.yaml", ["terrain=[{from: 0.2 m, slope: 5 deg}]"], True),
+        ("jump.yaml", ["terrain=[{from: 0.2 m, friction: 0.5}]"], False),
         ("double_jump.yaml", [], False),
     ],
 )
@@ -86,3 +96,12 @@ def test_the_plan_on_level_ground_has_no_walls() -> None:
     assert asked[0] and not asked[1]
     low = raised.lowered(planning.planner, planning.document, 0.5)
     assert low.model.mechanism.scene.ground.height(0.6) == pytest.approx(0.075)
+
+
+def test_what_certainly_cannot_be_met_is_not_sought_on_level_ground(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    planning = Planning.of(*load_task("platform.yaml", ["end.body/z=0.9 m"]))
+    monkeypatch.setattr(Planning, "_raised", lambda _: pytest.fail("it was sought"))
+    assert planning.refused is not None
+    assert [plan.refined for plan in planning.plans()] == [False]

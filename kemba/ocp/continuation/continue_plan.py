@@ -147,10 +147,10 @@ class Continuation:
         most = mesh.stages is not None and mesh.stages.stages == RADAU9.stages
         program, x = refiner.build(mesh.phases, mesh.start, RADAU9 if most else RADAU5)
         kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
-        if self.origin.finer and kept is not None:
-            program, kept = refiner.carried(RADAU9, program, kept)
         x = with_impacts(program, x, Continuing.ease) if kept is None else kept
-        if not self.task.scene.even:
+        if self.origin.finer and kept is not None:
+            program, x = refiner.carried(RADAU9, program, x)
+        elif self.task.scene.cornered:
             add_missed(program, x, Refining.near_rows)
         if self.origin.ticks:
             on_ticks(program, x)

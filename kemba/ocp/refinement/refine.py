@@ -283,7 +283,7 @@ class Refiner:
         cut, or most stages, which begin at an exact solution."""
         program, _ = self.build(other.phases, self.plan, scheme)
         start = carried(program, other.columns, other.scheme.points, x)
-        if scheme is RADAU9 or not self.task.scene.even:
+        if scheme is RADAU9 or self.task.scene.cornered:
             add_missed(program, start, Refining.near_rows)
         return program, start
 
