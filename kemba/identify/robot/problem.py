@@ -293,12 +293,15 @@ class RobotProblem(Problem):
         return list(contradictions(self.state, rows, r, self._sensor_columns))
 
     def _left(self, physics: Physics) -> Left:
-        """What the model leaves of other logs."""
+        """What the model leaves of other logs; everything of a motion that it cannot follow."""
 
         def left(*logs: ResampledLog) -> Array:
             batch, sensors = Batch(logs), SensorFaults(self.model.effects)
             ground, noise = ground_of(self.model)[1], stated_noise(batch)
-            state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
+            try:
+                state = linearise_at(physics, batch, sensors, {}, ground, self.unknown, noise)
+            except np.linalg.LinAlgError:  # such as one with ten times the strokes of its pistons
+                return np.full(len(logs), np.inf)
             r, run = state.pick(state.residuals([{}])), describe(state).run
             return np.array([rms(r[run == i]) for i in range(len(logs))])
 
