@@ -1,9 +1,5 @@
 """The ground: numbers and symbols agree, derivatives are finite, edges lie on the lower side."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import casadi as ca
 import numpy as np
 import pytest
@@ -147,21 +143,6 @@ def test_lines_that_say_nothing_or_have_wrong_units_are_refused() -> None:
     for line in ({"from": 0.1}, 3, {"height": "3 kg"}, {"slope": "80 deg"}, {"height": 1, "to": 2}):
         with pytest.raises(ConfigErrors, match=r"terrain\[0\]"):
             scene_in({"terrain": [line]})
-
-
-def test_a_new_kind_of_terrain_is_one_class() -> None:
-    """As docs/motions.md shows it, in a process of its own: kinds stay known."""
-    page = (Path(__file__).parents[2] / "docs/motions.md").read_text(encoding="utf-8")
-    source = page.split("```python\n")[1].split("```")[0]
-    code = (
-        "import numpy as np; from kemba.scene import scene_in\n"
-        'scene = scene_in({"terrain": [{"from": "0.5 m", "waves": "2 cm", "length": "0.3 m"}]})\n'
-        "assert scene_in(scene.dump()) == scene\n"
-        "print(np.round(scene.ground.height(np.array([0.4, 0.65, 0.8])), 12).tolist())"
-    )
-    command = [sys.executable, "-c", source + code]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[0.0, 0.02, 0.0]"
 
 
 def test_a_ramp_may_say_its_own_height() -> None:
