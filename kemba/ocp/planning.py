@@ -109,8 +109,9 @@ class Planning:
 
     def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
-        the other as long as they give any; none whose contacts and valves come in the order of an
-        earlier one, as the same program would refine it."""
+        the other as long as they give any, on level ground first where the scene rises from there;
+        none whose contacts and valves come in the order of an earlier one, as the same program
+        would refine it."""
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -121,11 +122,18 @@ class Planning:
                 failed = LEFT
             failed = failed if origin.given else ""
         task, planner, orders = self.planner.task, self.planner, _Orders()
+        free = planner.start is None and not self.refused
+        rising = self._raised() if free and rises(task) else iter(())
         for number, guess in enumerate(guesses(task, planner.model)):
             if number and self.over:
                 return
             if number:
                 planner.session.tell("another guess")
+            near = next(rising, None)
+            if near is not None:
+                yield near
+                if self.over:
+                    return
             own = guess if planner.start is None else replace(guess, pulse=0.0)
             found = self._from_guess(own, orders.new)
             if found is None:
@@ -136,9 +144,6 @@ class Planning:
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
                     yield replace(told, start=f"{start}{how}")
-            free = planner.start is None and not self.refused and not self.over
-            if number == 0 and free and rises(task):
-                yield from self._raised()
             only = planner.start is not None or task.refine != "radau"
             if only or not found.status.plan:
                 return
@@ -170,18 +175,16 @@ class Planning:
         plain = found.plain and self._timed(self._clear(replace(found.plain, task=task)))
         return replace(self._timed(self._clear(found)), plain=plain)
 
-    def _raised(self) -> Iterator[Plan]:
-        """The plan from the first refined one on level ground from which the scene can rise to its
-        own; nothing where there is none."""
+    def _raised(self) -> Iterator[Plan | None]:
+        """Of one plan on level ground after the other that in the task's scene; None where that
+        is not refined, or the scene does not rise from it."""
         planner, document = self.planner, self.document
-        planner.session.tell("from level ground")
         level = replace(self, planner=lowered(planner, document, 0.0))
+        planner.session.tell("from level ground")
         for first in level.plans():
             with self.clock.running():
                 found = raised(first, planner, document) if first.refined else None
-            if found is not None:
-                yield self._timed(self._clear(found))
-                return
+            yield found and self._timed(self._clear(found))
 
     def _clear(self, found: Plan) -> Plan:
         asked = found.status is Status.SOLVED and self.planner.task.clearance

@@ -9,13 +9,16 @@ from kemba.ocp.certificate.asked import measured
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.radau import RADAU5
+from kemba.ocp.phases.radau import RADAU3, RADAU5
 from kemba.ocp.planned import Plan
 from kemba.ocp.planning import plan
 from kemba.ocp.reading import load_task
 from kemba.ocp.refinement.refine import Refiner, reduction_of
 from kemba.ocp.refinement.start import solve_along, to_trajectory, warm
 from kemba.ocp.task.requirement import Requirement, quantities
+from kemba.scene.scene import Obstacle
+
+BOX = Obstacle.model_validate({"from": "2 m", "to": "2.1 m", "height": "0.1 m"})  # far ahead
 
 
 @cache
@@ -77,3 +80,22 @@ def test_where_nothing_keeps_to_it_the_solution_without_stays(
     monkeypatch.setattr("kemba.ocp.refinement.start.warm", lambda iterations: warm(0))
     found = solve_along(program, Iterate(x), warm(60), Control())
     assert found.solved and len(program.rows) == rows
+
+
+@pytest.mark.parametrize(("obstacles", "beside"), [([], False), ([BOX], True)])
+def test_beside_corners_rows_between_nodes_stand_from_the_start(
+    obstacles: list[Obstacle], beside: bool
+) -> None:
+    """Of the coarser scheme and of elastic programs too: knees 3 mm below where they may not be."""
+    found = jump()
+    task = found.task.model_copy(update={"obstacles": tuple(obstacles)})
+    knees = [q for name, q in quantities(found.model).items() if name.endswith("/knee/z")]
+    high = float(found.trajectory["front/knee/z"].max()) + 3e-3
+    bounds = [Requirement(("bounds", "knee"), q, None, -np.inf, high) for q in knees]
+    asked = [*found.requirements, *bounds]
+    half = reduction_of(found.model, task, asked, found.trajectory)
+    refiner = Refiner(found.model, task, asked, found.trajectory, half, Control())
+    assert found.stages is not None
+    for price in (0.0, 1.0):
+        program, _ = refiner.build(found.stages.phases, found.trajectory, RADAU3, price)
+        assert any("knee" in row.label and "between" in row.label for row in program.rows) is beside

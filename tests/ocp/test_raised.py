@@ -1,5 +1,6 @@
 """A plan in a scene from one on level ground: how its steps go, and when it is tried."""
 
+from dataclasses import is_dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,18 +14,18 @@ HIGHEST = 0.6  # of the scene, in the stiff example: beyond, only small steps ar
 
 
 def steps_of(
-    monkeypatch: pytest.MonkeyPatch, widest: Any, over: int = 1000, lags: bool = False
+    monkeypatch: pytest.MonkeyPatch, widest: Any, over: int = 1000, anew: list[float] | None = None
 ) -> tuple[list[Any], Any]:
     """The shares that are tried where a step from `share` is solved if it is no wider than
-    `widest(share)`, and what comes of it. `over`: tries after which time is over. `lags`: plans are
-    sought on another model."""
+    `widest(share)`, and what comes of it. `over`: tries after which time is over. `anew`: gets
+    those that may read phases anew."""
     tried: list[Any] = []
     solved = [0.0]
 
     def continued(share: Any, origin: Any) -> tuple[Any, str]:
-        physical = share is planner
-        tried.append("physical" if physical else share)
-        share = 1.0 if physical else share
+        tried.append(share)
+        if anew is not None and not origin.once:
+            anew.append(share)
         if share - solved[-1] > widest(solved[-1]):
             return None, "no solution near"
         solved.append(share)
@@ -32,9 +33,7 @@ def steps_of(
         return plan, ""
 
     ended = SimpleNamespace(ended=lambda: len(tried) >= over)
-    planner: Any = SimpleNamespace(
-        session=SimpleNamespace(control=ended, tell=lambda _: None), lags=lags or None
-    )
+    planner: Any = SimpleNamespace(session=SimpleNamespace(control=ended, tell=lambda _: None))
     monkeypatch.setattr(raised, "continued", continued)
     monkeypatch.setattr(raised, "lowered", lambda planner, document, share: share)
     monkeypatch.setattr(raised, "replace", lambda plan, **new: SimpleNamespace(**new))
@@ -60,9 +59,10 @@ def test_there_is_no_plan_where_no_small_step_is_solved(monkeypatch: pytest.Monk
     assert tried[-1] - 0.875 == pytest.approx(raised.LEAST)
 
 
-def test_physical_chambers_come_last(monkeypatch: pytest.MonkeyPatch) -> None:
-    tried, found = steps_of(monkeypatch, lambda share: 1.0, lags=True)
-    assert found is not None and tried == [0.125, 0.375, 0.875, 1.0, "physical"]
+def test_phases_are_read_anew_by_the_smallest_step_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    anew: list[float] = []
+    tried, _ = steps_of(monkeypatch, lambda share: 0.0 if share > HIGHEST else 1.0, anew=anew)
+    assert anew == tried[-1:]
 
 
 def test_there_is_no_plan_where_time_is_over(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,3 +105,33 @@ def test_what_certainly_cannot_be_met_is_not_sought_on_level_ground(
     monkeypatch.setattr(Planning, "_raised", lambda _: pytest.fail("it was sought"))
     assert planning.refused is not None
     assert [plan.refined for plan in planning.plans()] == [False]
+
+
+def test_every_step_has_the_air_of_the_task() -> None:
+    planning = Planning.of(*load_task("hurdle.yaml"))
+    half = raised.lowered(planning.planner, planning.document, 0.5)
+    kinds = [{e.kind for e in planner.model.effects} for planner in (half, half.seeking)]
+    assert "orifice_chamber" in kinds[0] - kinds[1]
+
+
+def test_level_ground_and_the_scene_take_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each guess the plan from level ground, if the scene rises from it, then its own."""
+    made: list[str] = []
+
+    def changed(old: Any, **new: Any) -> Any:
+        return replace(old, **new) if is_dataclass(old) else old
+
+    def from_guess(self: Planning, guess: Any, new: Any) -> Any:
+        where = "level" if self.planner.task.scene.ground.level is not None else "scene"
+        made.append(where)
+        return SimpleNamespace(
+            status=SimpleNamespace(plan=True), refined=True, plain=None, start="guess"
+        )
+
+    planning = Planning.of(*load_task("platform.yaml"))
+    monkeypatch.setattr(Planning, "_from_guess", from_guess)
+    monkeypatch.setattr("kemba.ocp.planning._Orders.keep", lambda *_: None)
+    monkeypatch.setattr("kemba.ocp.planning.replace", changed)
+    monkeypatch.setattr("kemba.ocp.planning.raised", lambda *_: None)
+    list(planning.plans())
+    assert made[:4] == ["level", "scene", "level", "scene"]

@@ -294,8 +294,9 @@ class Refiner:
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The program of some phases and its start (size,), scaled. Raises ValueError for a model
-        to which the method does not apply."""
+        """The program of some phases and its start (size,), scaled; with rows between nodes near
+        corners, so that a start on few nodes does not cut them. Raises ValueError for a model to
+        which the method does not apply."""
         constraints = read_constraints(self.model, self.reduction)
         program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic
@@ -311,6 +312,8 @@ class Refiner:
         add_requirements(program, self.requirements, at_first, at_last)
         add_mode_constraints(program, at_first)
         x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
+        if self.task.scene.cornered and (elastic > 0.0 or scheme is RADAU3):
+            add_missed(program, x, Refining.near_rows)
         return program, np.clip(x, program.lower, program.upper)
 
     def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
