@@ -11,7 +11,8 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 IMAGES = ROOT / "docs/images/gallery"
 ORDER = (
-    "jump", "max_jump", "hop", "forward", "drop", "supply_pressure", "payload", "other_robot",
+    "jump", "max_jump", "max_jump_land", "hop", "forward", "drop", "bound", "popup", "accelerate",
+    "supply_pressure", "payload", "other_robot",
     "repeats", "where_it_fails", "what_is_missing", "bench", "own_effect", "foreign_log",
 )  # fmt: skip
 
@@ -42,9 +43,12 @@ def entry(name: str) -> str:
     title, _, text = (ast.get_docstring(ast.parse(source)) or name).partition("\n")
     code = source.split('"""', 2)[2].strip()
     title, text = title.rstrip("."), " ".join(text.split())
+    files = [f"{name}{ending}" for ending in (".png", ".gif")]
+    shown = "\n\n".join(
+        f"![{title}](images/gallery/{file})" for file in files if (IMAGES / file).is_file()
+    )
     return (
-        f"## {title}\n\n{text}\n\n"
-        f"![{title}](images/gallery/{name}.png)\n\n"
+        f"## {title}\n\n{text}\n\n{shown}\n\n"
         f"<details><summary>examples/{name}.py</summary>\n\n```python\n{code}\n```\n\n</details>\n"
     )
 
