@@ -40,6 +40,7 @@ MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
 END = 0.1  # share of the stroke within which a moving rod may be one in another unit
 SHARE = 0.2  # travel, as a share of the farthest place, from which a rod moves
+FOLLOWED = 0.1  # share of the travel that a row may be from the one before
 UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
@@ -264,7 +265,13 @@ def _remarks(log: Trajectory) -> Iterator[str]:
                 f"stroke of {1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong "
                 "(see --map), and rates of frictions with it"
             )
-    gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
+    step = float(np.median(np.diff(log.time)))
+    if step > GateSettings.milliseconds and log.meta["kind"] != "vessel":
+        yield (
+            f"{name}: a row every {step:.3g} s: if the time was in milliseconds, all rates are "
+            "wrong (see --map)"
+        )
+    gaps = np.diff(log.time) > 5 * step
     if gaps.any():
         yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
     for column in needed(log):
@@ -302,7 +309,15 @@ def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
 def _rig_time(log: Trajectory) -> Iterator[KembaError]:
     vessel = log.meta["kind"] == "vessel"
     faults = list(_clock(log, FEWEST_STILL if vessel else FEWEST))
-    yield from faults or ([] if vessel else _seldom(log, GateSettings.milliseconds))
+    if faults or vessel:
+        yield from faults
+    elif not all(_follows(log[n]) for n in needed(log) if n.endswith(("/x", "/q"))):
+        yield from _seldom(log, GateSettings.milliseconds)
+
+
+def _follows(y: Array) -> bool:
+    """Whether a channel changes by little of its travel from one row to the next."""
+    return bool(np.nanmedian(np.abs(np.diff(y))) < FOLLOWED * _travel(y))
 
 
 def _rig_readings(log: Trajectory) -> Iterator[KembaError]:

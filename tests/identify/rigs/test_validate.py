@@ -99,7 +99,8 @@ def test_without_a_weight_another_unit_is_that_of_the_motion_or_of_the_force(
     small = column == "axis/q [m]"
     columns[column] = columns[column] * (0.1 if small else 10.0)
     log = Trajectory(TIME, columns, RUN | {"kind": "drive"})
-    with pytest.raises(BadData, match=r"axis/q is .* too small .*; or axis/tau is .* too large"):
+    words = r"axis/tau is .* too large .*; or axis/q is .* too small .*; or several of these are"
+    with pytest.raises(BadData, match=words):
         rig_problem([log], load_model(tmp_path / "model.yaml")).validate()
 
 
@@ -214,7 +215,7 @@ def test_a_small_motion_near_the_end_is_read_and_said(place: float, tmp_path: Pa
 @pytest.mark.parametrize(
     ("scale", "words"),
     [
-        (1000.0, r"log: has a row every 2 s; at least 2 rows a second; is the time in millis"),
+        (1000.0, r"log: the time is about (1\d00|990) times too large \(its unit is wrong\); "),
         (100.0, r"log: the time is about (100|99) times too large \(its unit is wrong\); "),
         (0.1, r"log: the time is about (10|9\.\d) times too small \(its unit is wrong\); the"),
     ],
@@ -252,3 +253,74 @@ def test_friction_and_small_zeros_are_no_mistakes() -> None:
     """These are for `discover` to find."""
     log = pendulum(Q + 0.1, FORCE + 1.5 * np.tanh(V / 0.01))
     assert rig_problem([log], load_model("pendulum_rig")).validate() == []
+
+
+@pytest.mark.parametrize(
+    ("q", "tau", "time", "words"),
+    [
+        (
+            1e3,
+            1e3,
+            1.0,
+            r"axis/q is about 1000 times .* and axis/tau is about 1000 times too large",
+        ),
+        (57.3, 8.85, 1.0, r"axis/q is about 57 times .* and axis/tau is about 8.[789] times too l"),
+        (57.3, 1e3, 100.0, r"about 5\d times .* and axis/tau is about 9\d0 .* and the time is ab"),
+    ],
+)
+def test_several_units_at_once_are_named(q: float, tau: float, time: float, words: str) -> None:
+    right = pendulum(Q, FORCE)
+    columns = {"axis/q [rad]": q * right["axis/q"], "axis/tau [N.m]": tau * right["axis/tau"]}
+    log = Trajectory(time * TIME, columns, right.meta)
+    with pytest.raises(BadData) as raised:
+        rig_problem([log], load_model("pendulum_rig")).validate()
+    assert re.search(words, str(raised.value)), str(raised.value)
+
+
+@pytest.mark.parametrize("rotary", [False, True])
+def test_a_motion_that_no_drive_has_strength_for_is_of_other_units(
+    rotary: bool, tmp_path: Path
+) -> None:
+    """Thousandths of both: without a weight the force answers the motion as well as before."""
+    q, tau, inertia = ("rad", "N.m", 0.02) if rotary else ("m", "N", 2.0)
+    rig = {"kind": "drive", "motion": "rotary" if rotary else "linear"}
+    dump_yaml({"rig": rig | {"inertia": f"{inertia} {'kg.m2' if rotary else 'kg'}"}},
+              tmp_path / "model.yaml")  # fmt: skip
+    model, force = load_model(tmp_path / "model.yaml"), inertia * (A + 1.5 * np.tanh(V / 0.01))
+    for factor in (1.0, 1e3):
+        columns = {f"axis/q [{q}]": factor * Q, f"axis/tau [{tau}]": factor * force}
+        problem = rig_problem([Trajectory(TIME, columns, RUN | {"kind": "drive"})], model)
+        if factor == 1.0:
+            assert problem.validate() == []
+        else:
+            with pytest.raises(BadData, match=r"axis/tau does .* W for each kilogram that moves"):
+                problem.validate()
+
+
+def test_an_inertia_far_from_that_of_the_rig_is_not_written(tmp_path: Path) -> None:
+    """Friction hides that motion and time are in other units: what is left is no inertia."""
+    rig = {"kind": "drive", "inertia": "2 g"}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    force = 0.2 * A + 6.0 * np.tanh(V / 0.01)
+    noise = 0.05 * np.random.default_rng(0).standard_normal(len(TIME))
+    columns = {"axis/q [m]": Q, "axis/tau [N]": force + noise}
+    Trajectory(TIME, columns, {"kind": "drive"}).write(tmp_path / "log.csv")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), str(tmp_path / "model.yaml"))
+    assert not answer.writes
+    assert re.search("would be .* times what the rig is said to have|its unit", answer.sentence)
+
+
+def test_a_rig_slower_than_two_rows_a_second_is_read_and_asked_about() -> None:
+    """An axis that creeps, a row every two seconds; one that turns between two rows is too fast."""
+    model, slow = load_model("drive_rig"), np.arange(0.0, 800.0, 2.0)
+    force = 20.0 * np.tanh(np.cos(0.02 * slow) * 0.02 / 1e-3)
+    for rate in (0.02, 2.0):
+        columns = {"axis/q [m]": np.sin(rate * slow), "axis/tau [N]": force}
+        log = Trajectory(slow, columns, RUN | {"kind": "drive"})
+        if rate < 1.0:
+            assert any(
+                "if the time was in milliseconds" in said for said in check_all([log], model)
+            )
+        else:
+            with pytest.raises(BadData, match="has a row every 2 s; at least 2 rows a second"):
+                check_all([log], model)
