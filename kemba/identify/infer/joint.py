@@ -298,6 +298,9 @@ def _as_written(
             slope[i] = nominal
             value[i], (low[i], high[i]) = nominal * value[i], sorted(nominal * ends[i])
             figures[name] = float(value[i])
+            if hasattr(problem, "model") and name in problem.model.parameters:
+                declared = problem.model.parameters[name][0]
+                figures[name] = float(np.clip(figures[name], declared.lower, declared.upper))
             continue
         bounds = candidate.keys()[name]
         value[i], low[i], high[i] = np.clip([value[i], low[i], high[i]], bounds.lower, bounds.upper)

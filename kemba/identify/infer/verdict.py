@@ -14,6 +14,7 @@ from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import excess
+from kemba.identify.logs.gate import unit_in_doubt
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.model.model import Model
 
@@ -98,10 +99,23 @@ def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tu
             assert isinstance(axis, DriveAxis)
             times = abs(told["J"].value) / axis.inertia
             said |= dict.fromkeys(_of_rig(kind, times, times < HEAVY))
-    for figure, value in joint.figures.items() if joint else ():
-        if figure in RIG_FIGURES and model is not None:
-            times = float(value) / given_figure(model, *figure.rsplit(".", 1))
-            said |= dict.fromkeys(_of_rig(figure, times, 1.0 / PLATE < times < PLATE))
+        if (
+            model
+            and model.mechanism.rig == "cylinder"
+            and any("m" in v.unit for v in told.values())
+        ):
+            at = problem.operating_point()
+            if doubted := unit_in_doubt(at.x, at.stroke):
+                said[f"{doubted}; if it did not, `stroke` of the model may be what it moves"] = None
+    for figure, value in (joint.figures if joint else {}).items():
+        if joint and model and figure in RIG_FIGURES:
+            given = given_figure(model, *figure.rsplit(".", 1))
+            low, high = (
+                ends[joint.names.index(figure)] / given for ends in (joint.low, joint.high)
+            )
+            said |= dict.fromkeys(
+                _of_rig(figure, value / given, low < PLATE and high > 1.0 / PLATE)
+            )
     return tuple(said)
 
 

@@ -256,15 +256,9 @@ def _travel(y: Array) -> float:
 def _remarks(log: Trajectory) -> Iterator[str]:
     name = log.meta["name"]
     yield from (f"{name}: {said}" for said in log.meta.get("read", ()))
-    if "piston/x" in log:
-        x, stroke = log["piston/x"], log.meta.get("stroke", 0.0)
-        farthest = float(np.nanmax(np.abs(x)))
-        if farthest < END * stroke and _travel(x) > SHARE * farthest:
-            yield (
-                f"{name}: piston/x stays within {1e3 * farthest:.3g} mm of the retracted end, of a "
-                f"stroke of {1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong "
-                "(see --map), and rates of frictions with it"
-            )
+    stroke = log.meta.get("stroke", 0.0)
+    if "piston/x" in log and (doubted := unit_in_doubt(log["piston/x"], stroke)):
+        yield f"{name}: {doubted}, and rates of frictions with it"
     step = float(np.median(np.diff(log.time)))
     if step > GateSettings.milliseconds and log.meta["kind"] != "vessel":
         yield (
@@ -279,6 +273,17 @@ def _remarks(log: Trajectory) -> Iterator[str]:
         missing = round(share * (1 + (log.time[-1] - log.time[0]) / step))
         if missing:
             yield f"{name}: {column}: {missing} readings missing"
+
+
+def unit_in_doubt(x: Array, stroke: float) -> str:
+    """That a rod which stays at `x` (n,) [m] may be one in another unit; empty where not."""
+    farthest = float(np.nanmax(np.abs(x)))
+    if farthest >= END * stroke or _travel(x) <= SHARE * farthest:
+        return ""
+    return (
+        f"piston/x stays within {1e3 * farthest:.3g} mm of the retracted end, of a stroke of "
+        f"{1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong (see --map)"
+    )
 
 
 def sentence(faults: Iterable[KembaError]) -> str:

@@ -11,6 +11,7 @@ from scipy.optimize import minimize_scalar, nnls
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.errors import KembaError
 from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, simplest
+from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
@@ -34,7 +35,7 @@ LARGEST = 95.0  # percentile of the rows that counts as the largest [%]
 
 def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` (k,) of the gap."""
-    force = _Force(model, sigma, gap)
+    force = _Force(log, model, sigma, gap)
     small = SMALL * np.sqrt(len(sigma)) / force.size(log)
     hint = "correct it in a column map (--map), or the rig's figures in the model"
     if force.left(log) >= small:
@@ -59,9 +60,10 @@ class _Force:
     are factors of what the model predicts at rest and of what accelerates, which are fitted.
     """
 
-    def __init__(self, model: Model, sigma: Array, gap: Gap) -> None:
+    def __init__(self, log: RigLog, model: Model, sigma: Array, gap: Gap) -> None:
         self.model, self.sigma, self.gap = model, sigma, gap
         self.place, self.answer = PLACE[model.mechanism.rig], ANSWER[model.mechanism.rig]
+        self._rate = rms(log.speed)
         self._seen: dict[tuple[RigLog, bool], Array] = {}
 
     def read(self, log: RigLog) -> Array:
@@ -86,7 +88,9 @@ class _Force:
     def _fitted(self, log: RigLog, units: Units, sign: float) -> tuple[float, tuple[float, float]]:
         """The share that is left, and the factors of rest and motion."""
         side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
-        known = [-side * np.tanh(log.speed / still), -side * log.speed]
+        # how smoothly friction turns over tells no unit
+        speed = log.speed * (self._rate / max(rms(log.speed), 1e-300))
+        known = [-side * np.tanh(speed / still), -side * speed]
         if not self.model.mechanism.bore:
             known += [np.ones(len(self.sigma)), -np.ones(len(self.sigma))]
         force, rest = sign * self.read(log), self._predicted(log, TIME in units)

@@ -212,6 +212,18 @@ def test_a_small_motion_near_the_end_is_read_and_said(place: float, tmp_path: Pa
     assert len(said) == (place < 0.01) and all("its unit is wrong" in line for line in said)
 
 
+def test_what_hangs_on_a_position_in_doubt_is_not_written(tmp_path: Path) -> None:
+    """Tenths of the position: the damping would be ten times and more that of the rig."""
+    rig_of(tmp_path)
+    read, log = cylinder(12.0), tmp_path / "log.csv"
+    read["piston/F [N]"] -= 200.0 * 0.03 * 1.3 * np.cos(1.3 * TIME)
+    for share in (1.0, 0.1):
+        Trajectory(TIME, {**read, "piston/x [m]": share * read["piston/x [m]"]}, RUN).write(log)
+        answer, _ = discover_logs([log], (), str(tmp_path / "model.yaml"))
+        assert answer.writes == (share == 1.0)
+        assert ("of the retracted end" in answer.sentence) == (share < 1.0)
+
+
 @pytest.mark.parametrize(
     ("scale", "words"),
     [
