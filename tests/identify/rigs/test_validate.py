@@ -277,7 +277,7 @@ def test_friction_and_small_zeros_are_no_mistakes() -> None:
             r"axis/q is about 1000 times .* and axis/tau is about 1000 times too large",
         ),
         (57.3, 8.85, 1.0, r"axis/q is about 57 times .* and axis/tau is about 8.[789] times too l"),
-        (57.3, 1e3, 100.0, r"about 5\d times .* and axis/tau is about 9\d0 .* and the time is ab"),
+        (57.3, 1e3, 100.0, r"about 5\d times .* and axis/tau is about (8|9)\d0 .* and the time is"),
     ],
 )
 def test_several_units_at_once_are_named(q: float, tau: float, time: float, words: str) -> None:
