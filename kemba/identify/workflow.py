@@ -124,7 +124,8 @@ def discover_logs(
         problem, remarks = admitted(fitted, built)
         remarks = [*said, *evidence_faults(model), *built.remarks, *checked, *remarks]
         judge = make_problem(excerpts(kept)[0], built) if kept else None
-        found = discover(problem, judge, _searching(time_limit, time.monotonic() - started, share), say)
+        left = _searching(time_limit, time.monotonic() - started, share)
+        found = discover(problem, judge, left, say)
         answer = found.answer
         say("comparing what is written with the quoted logs")
         quoted = _quote(answer, judge or problem, kept or fitted, model)
