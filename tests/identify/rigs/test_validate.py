@@ -261,6 +261,20 @@ def test_a_motor_of_another_unit_beside_a_heavier_axis_is_no_effect(tmp_path: Pa
     assert not answer.writes and "off by more than any motor's is; its unit" in answer.sentence
 
 
+@pytest.mark.parametrize("friction", [0.1, 0.0])
+def test_less_friction_than_the_model_has_hides_no_mistake(friction: float) -> None:
+    """What the model has too much of, no friction of any size puts right."""
+    model, force = load_model("pendulum_rig"), FORCE + (friction - 0.4) * np.tanh(V / 0.01)
+    right = pendulum(Q, force)
+    assert rig_problem([right], model).validate() == []
+    for log, words in (
+        (pendulum(Q + 0.6, force), r"axis/q counts from another zero \(`offset: -34\.\d deg`\); "),
+        (Trajectory(100.0 * TIME, right.columns, right.meta), r"the time is about (99|100) times"),
+    ):
+        with pytest.raises(BadData, match=words):
+            rig_problem([log], model).validate()
+
+
 def test_friction_and_small_zeros_are_no_mistakes() -> None:
     """These are for `discover` to find."""
     log = pendulum(Q + 0.1, FORCE + 1.5 * np.tanh(V / 0.01))
