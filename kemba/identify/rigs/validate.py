@@ -11,7 +11,6 @@ from scipy.optimize import minimize_scalar, nnls
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.errors import KembaError
 from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, simplest
-from kemba.identify.infer.windows import rms
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
@@ -26,6 +25,8 @@ UNIT = 3.0
 TIME = "the time"
 WRONG = "(its unit is wrong)"
 SIZES = np.linspace(-9.0, 9.0, 25)  # logarithms of those that are tried first
+# within which speeds friction turns over, as shares of the model's: it tells no unit
+SHARP = np.geomspace(0.01, 30.0, 8)
 CLOSELY = 3e-3  # share of their distance to which it is found
 # work that no drive does for each kilogram that moves [W/kg]: the best motors alone do 1e4
 POWER = 2e4
@@ -35,7 +36,7 @@ LARGEST = 95.0  # percentile of the rows that counts as the largest [%]
 
 def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` (k,) of the gap."""
-    force = _Force(log, model, sigma, gap)
+    force = _Force(model, sigma, gap)
     small = SMALL * np.sqrt(len(sigma)) / force.size(log)
     hint = "correct it in a column map (--map), or the rig's figures in the model"
     if force.left(log) >= small:
@@ -60,10 +61,9 @@ class _Force:
     are factors of what the model predicts at rest and of what accelerates, which are fitted.
     """
 
-    def __init__(self, log: RigLog, model: Model, sigma: Array, gap: Gap) -> None:
+    def __init__(self, model: Model, sigma: Array, gap: Gap) -> None:
         self.model, self.sigma, self.gap = model, sigma, gap
         self.place, self.answer = PLACE[model.mechanism.rig], ANSWER[model.mechanism.rig]
-        self._rate = rms(log.speed)
         self._seen: dict[tuple[RigLog, bool], Array] = {}
 
     def read(self, log: RigLog) -> Array:
@@ -88,9 +88,8 @@ class _Force:
     def _fitted(self, log: RigLog, units: Units, sign: float) -> tuple[float, tuple[float, float]]:
         """The share that is left, and the factors of rest and motion."""
         side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
-        # how smoothly friction turns over tells no unit
-        speed = log.speed * (self._rate / max(rms(log.speed), 1e-300))
-        known = [-side * np.tanh(speed / still), -side * speed]
+        known = [-side * np.tanh(log.speed / (sharp * still)) for sharp in SHARP]
+        known += [-side * log.speed]
         if not self.model.mechanism.bore:
             known += [np.ones(len(self.sigma)), -np.ones(len(self.sigma))]
         force, rest = sign * self.read(log), self._predicted(log, TIME in units)
