@@ -210,7 +210,8 @@ def _check_usable(path: Path, force: bool = False) -> None:
     if path.is_dir() and any(item.name != LOCK for item in path.iterdir()):
         if not (path / MANIFEST).is_file():
             raise KembaError(f"--out {path}", "holds other files", "a new folder was expected")
-        if read_manifest(path).get("status") == "running":
+        status, ended = read_manifest(path).get("status"), (path / "certificate.json").is_file()
+        if status == "running" or (status == "failed" and not ended):  # an error ended it
             return
         if not force:
             hint = "give another --out, or --force to replace it"

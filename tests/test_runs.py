@@ -52,6 +52,15 @@ def test_finished_runs_are_kept() -> None:
         RunFolder.create("out", "jump")
 
 
+def test_a_folder_that_an_error_left_is_used_again() -> None:
+    RunFolder.create("out", "jump").finish("failed")  # no plan was judged
+    folder = RunFolder.create("out", "jump")
+    (folder / "certificate.json").write_text("{}")
+    folder.finish("failed")
+    with pytest.raises(KembaError, match="--out out: holds a finished run already; give another"):
+        RunFolder.create("out", "jump")
+
+
 def test_other_folders_are_left_alone() -> None:
     Path("data").mkdir()
     Path("data/thesis.tex").write_text("")

@@ -198,7 +198,7 @@ def learn(
     from kemba.runs import load_run
     from kemba.solve import Listener
 
-    folders = [runs.path] if isinstance(runs, Planned) else _listed(runs)
+    folders = [runs.path] if isinstance(runs, Planned) else _several(runs)
     task = target or load_run(folders[-1]).task
     told = settings(changes), _listed(holdout), columns, time_limit, correct
     asked = Asked(folders, _listed(logs), task, *told)
@@ -206,5 +206,12 @@ def learn(
     return Learned(found, Planned.read(folder.path))
 
 
-def _listed(logs: Logs) -> list[str | Path]:
-    return [logs] if isinstance(logs, str | Path) else list(logs)
+def _several(paths: Logs) -> list[str | Path]:
+    return [paths] if isinstance(paths, str | Path) else list(paths)
+
+
+def _listed(logs: Logs) -> list[Path]:
+    """Logs; a folder stands for those in it, as at the command line."""
+    from kemba.logs import log_files
+
+    return log_files(_several(logs))

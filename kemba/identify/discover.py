@@ -40,7 +40,7 @@ from kemba.identify.infer.structure import (
     joined,
     structure_row,
 )
-from kemba.identify.infer.verdict import Caveats, caveats_of, is_sure, verdict_on
+from kemba.identify.infer.verdict import Caveats, caveats_of, implausible, is_sure, verdict_on
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 
@@ -183,6 +183,8 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
         joint = None
     if not best and formula is None and not caveats.reasons:
         joint = joint_fit(search.problem, NULL, search.points[NULL].fit.theta)
+    if gross := implausible(search, whole if joint else best, joint):
+        caveats, joint = Caveats(gross), None
     whole = whole if joint else best
     search.say("ranking the effects")
     ranking = ranked(search, selection, kept, whole, joint)

@@ -101,13 +101,14 @@ def discover_logs(
     time_limit: float = 300.0,
     say: Callable[[str], None] = lambda text: None,
     out: str | Path | None = None,
+    share: float = 1.0,
 ) -> tuple[Answer, Discovery | None]:
     """Answer which effect `model` lacks; written to the folder `out` when one is given.
 
     The errors that it tells are those of `compare` with the model that is written, on the logs of
     `holdout`; where there are none, on logs that are kept aside. Data that cannot be right give the
-    verdict `bad-data`, and nothing is fitted. Raises KembaError for files that cannot be read, and
-    for a `time_limit` [s] in which these logs cannot be answered.
+    verdict `bad-data`, and nothing is fitted. `share` of the `time_limit` [s] is for this. Raises
+    KembaError for files that cannot be read, and for a limit in which logs cannot be answered.
     """
     started = time.monotonic()
     columns = load_map(column_map) if column_map else None
@@ -123,7 +124,8 @@ def discover_logs(
         problem, remarks = admitted(fitted, built)
         remarks = [*said, *evidence_faults(model), *built.remarks, *checked, *remarks]
         judge = make_problem(excerpts(kept)[0], built) if kept else None
-        found = discover(problem, judge, _searching(time_limit, time.monotonic() - started), say)
+        left = _searching(time_limit, time.monotonic() - started, share)
+        found = discover(problem, judge, left, say)
         answer = found.answer
         say("comparing what is written with the quoted logs")
         quoted = _quote(answer, judge or problem, kept or fitted, model)
@@ -138,12 +140,12 @@ def discover_logs(
     return answer, found
 
 
-def _searching(limit: float, begun: float) -> float:
-    """The time [s] for the search of an answer that may take `limit`, after `begun`. Raises
-    KembaError where there is none."""
-    left = limit - begun - ENDS * begun - DRAWN
+def _searching(limit: float, begun: float, share: float = 1.0) -> float:
+    """The time [s] for the search of an answer that may take its `share` of `limit`, after `begun`.
+    Raises KembaError where there is none."""
+    left = share * limit - begun - ENDS * begun - DRAWN
     if left < 0.0:
-        need = (1.0 + BEGINS + ENDS) * begun + DRAWN
+        need = ((1.0 + BEGINS + ENDS) * begun + DRAWN) / share
         what = f"{limit:g} s are too short for these logs, of which nothing was fitted"
         raise KembaError("time limit", what, f"about {need:.0f} s are needed on this machine")
     return left

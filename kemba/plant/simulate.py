@@ -218,8 +218,9 @@ def load_meanwhile(*modules: str) -> None:
 def _load(*modules: str) -> None:
     import kemba.plant.player  # noqa: F401
     from kemba.plant.kernel.jit import FOLDER, is_kept, load
+    from kemba.plant.kernel.play import play
 
-    if FOLDER is not None and not is_kept("play"):
+    if FOLDER is not None and not is_kept(play):
         _STARTED.append(_compiler())
     load()
     for module in modules:
@@ -238,8 +239,9 @@ def _compiler() -> subprocess.Popen[bytes]:
 def wait_for_compiler(tell: Tell) -> None:
     """Say so and wait where the simulator is compiled for the first time on this machine."""
     from kemba.plant.kernel.jit import is_kept
+    from kemba.plant.kernel.play import play
 
-    if not is_kept("play"):
+    if not is_kept(play):
         tell("compiling the simulator, once on this machine")
         compile_kernel()
 

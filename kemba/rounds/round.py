@@ -165,6 +165,7 @@ def as_executed(model: str, task: Task, path: Path) -> str:
 
 
 PLAIN = "controller_uncorrected.csv"
+LEARNING = 0.5  # share of the time limit of a round that is for what its model lacks
 PLANNING = 0.8  # share of the time left that the plan may take; the rest is for its correction
 
 
@@ -295,7 +296,7 @@ def learn_into(
 def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     """One round, written to `folder`: model, plan, corrected table, learning.json.
 
-    Half of its time limit is for discovery, most of what is then left for the plan.
+    A share of its time limit is for discovery, most of what is then left for the plan.
 
     Raises KembaError where runs, logs and target do not fit together, or the logs cannot be right.
     """
@@ -325,7 +326,7 @@ def _learnt(
     out.mkdir()
     here = as_executed(old.model, old, out / "model_of_the_run.yaml")
     answer, _ = discover_logs(
-        past.logs, asked.holdout, here, asked.column_map, asked.time_limit / 2.0, tell, out
+        past.logs, asked.holdout, here, asked.column_map, asked.time_limit, tell, out, LEARNING
     )
     if answer.verdict == "bad-data":
         raise KembaError("--logs", answer.sentence, hint="see kemba-opt check LOG")

@@ -49,7 +49,7 @@ def test_results_show_themselves_in_notebooks(jump: Planned) -> None:
 def test_executions_give_logs_that_compare_reads(done: Executions) -> None:
     assert done.landed == 2 and done.good and len(done.logs) == 2
     assert "2 of 2 landed" in str(done)
-    found = kemba.compare(done.logs[0], run=done.run)
+    found = kemba.compare(done.logs[0].parent, run=done.run)  # the folder stands for both
     assert found.noise_ratio > 1.0 and not found.good  # the plant has effects that plans lack
     assert found.figure().axes
 

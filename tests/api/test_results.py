@@ -47,3 +47,6 @@ def test_a_search_leaves_time_for_the_end_of_its_answer() -> None:
     told = "20 s are too short for these logs, of which nothing was fitted; about 36 s are needed"
     with pytest.raises(KembaError, match=told):
         _searching(20.0, 5.0)
+    # of a round, of which half is for learning, the limit that was given is told
+    with pytest.raises(KembaError, match=r"20 s are too short .* about 73 s are needed"):
+        _searching(20.0, 5.0, 0.5)

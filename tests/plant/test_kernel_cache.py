@@ -17,15 +17,28 @@ def twice(x: float) -> float:
 
 def test_what_was_compiled_is_loaded_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
-    assert not jit.is_kept("twice")
-    assert jit.entry(twice)(2.0) == 4.0
-    assert jit.is_kept("twice")
+    first = jit.entry(twice)
+    assert not jit.is_kept(first)
+    assert first(2.0) == 4.0
+    assert jit.is_kept(first) and jit.is_kept(jit.entry(twice))
     (kept,) = tmp_path.rglob("*.nbc")
     before = kept.stat().st_mtime_ns
     again = jit.entry(twice)
     assert again(2.0) == 4.0
     assert sum(again.__dict__["dispatcher"].stats.cache_hits.values()) == 1
     assert kept.stat().st_mtime_ns == before
+
+
+def test_what_another_installation_left_is_not_what_this_one_has(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Numba compiles it anew, which takes half a minute of the kernel, and is said."""
+    monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
+    jit.entry(twice)(2.0)
+    (index,) = tmp_path.rglob("*.nbi")
+    (other := tmp_path / "kernel_of_another").mkdir()
+    index.rename(other / index.name)
+    assert not jit.is_kept(jit.entry(twice))
 
 
 @pytest.mark.parametrize("size", [0, 20])
@@ -36,6 +49,7 @@ def test_a_damaged_cache_is_not_used(
     jit.entry(twice)(2.0)
     for path in [*tmp_path.rglob("*.nbc"), *tmp_path.rglob("*.nbi")]:
         path.write_bytes(path.read_bytes()[:size])
+    assert not jit.is_kept(jit.entry(twice))
     assert jit.entry(twice)(2.0) == 4.0
 
 
@@ -92,10 +106,12 @@ def test_the_first_time_a_second_process_compiles(
     started: list[None] = []
     monkeypatch.setattr(loading, "_compiler", lambda: started.append(None))
     monkeypatch.setattr(jit, "FOLDER", str(tmp_path))
+    monkeypatch.setattr(jit, "is_kept", lambda entry: False)
     loading._load()
     assert len(started) == 1
-    (tmp_path / "play.play-46.py311.1.nbc").touch()
+    monkeypatch.setattr(jit, "is_kept", lambda entry: True)
     loading._load()
+    monkeypatch.setattr(jit, "is_kept", lambda entry: False)
     monkeypatch.setattr(jit, "FOLDER", None)
     loading._load()
     assert len(started) == 1

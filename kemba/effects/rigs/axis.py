@@ -27,6 +27,11 @@ class DriveAxis(Effect):
     publishes = ("carried",)
     mirror: ClassVar[dict[str, str]] = {"tau": "-tau"}
 
+    @property
+    def inertia(self) -> float:
+        """Of all that moves [kg or kg.m2]."""
+        return self.J + self.m * (self.arm**2 if self.hangs else 1.0)
+
     def tolerances(self) -> dict[str, float]:
         return {n: PLATE.share(1.0) for n in ("J", "m") if getattr(self, n)}
 

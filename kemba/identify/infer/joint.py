@@ -291,13 +291,16 @@ def _as_written(
             if hasattr(problem, "model") and (
                 name not in problem.own_figures and not is_fault(name)
             ):
-                nominal = _nominal(problem.model, effect, parameter)
+                nominal = given_figure(problem.model, effect, parameter)
             if isinstance(nominal, tuple):
                 figures[name] = tuple(float(value[i]) * x for x in nominal)
                 continue
             slope[i] = nominal
             value[i], (low[i], high[i]) = nominal * value[i], sorted(nominal * ends[i])
             figures[name] = float(value[i])
+            if hasattr(problem, "model") and name in problem.model.parameters:
+                declared = problem.model.parameters[name][0]
+                figures[name] = float(np.clip(figures[name], declared.lower, declared.upper))
             continue
         bounds = candidate.keys()[name]
         value[i], low[i], high[i] = np.clip([value[i], low[i], high[i]], bounds.lower, bounds.upper)
@@ -325,7 +328,7 @@ def _far(problem: Problem, name: str, value: float, low: float, high: float) -> 
     return f"{name} is {off}: more than it may differ by itself, as an area or a sensor's scale may"
 
 
-def _nominal(model: Model, effect: str, figure: str) -> Any:
+def given_figure(model: Model, effect: str, figure: str) -> Any:
     """The value of a figure of a model's effect: a number, a table, or (`fill[0]`) an entry."""
     name, _, entry = figure.partition("[")
     value = model.effect(effect).value(name)

@@ -2,20 +2,28 @@
 
 from dataclasses import dataclass
 
+from kemba.effects.rigs.axis import DriveAxis
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, VerdictSettings
 from kemba.identify.infer.cross_validation import HeldOut, error
 from kemba.identify.infer.formula import Formula
+from kemba.identify.infer.joint import RIG_FIGURES, JointFit, given_figure
 from kemba.identify.infer.ranking import values
 from kemba.identify.infer.residual import Drift, explains_structure, pattern_left, unfinished
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import excess
+from kemba.identify.logs.gate import unit_in_doubt
 from kemba.identify.problem.sensor_faults import is_fault
+from kemba.model.model import Model
 
-GROSS = 0.2  # error of a gain that is another unit, and no sensor's: ten times its usual size
-MOTOR = 2.0  # the same of the factor by which a motor's force is off, which is known to 10 %
+# gains that no sensor and no motor has, least and largest: a sensor's is off by ten times its usual
+# error there, a motor's force is known to 10 %
+SENSOR, MOTOR = (-0.2, 0.2), (0.5, 2.0)
+DRIVEN = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}
+PLATE = 3.0  # factor by which no figure of a rig is off: feet for metres are 3.28
+HEAVY = 10.0  # inertia that was forgotten, over the one that is known: gears and rotors have less
 
 
 @dataclass(frozen=True)
@@ -38,8 +46,6 @@ def caveats_of(
     """Why the best answer cannot be complete, and whether it is a part of one; `ended`: the time
     was over before the search was."""
     settings, reasons, best = VerdictSettings, [], selection.best
-    if gross := _other_units(search, best):
-        return Caveats(gross)
     before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part
     if drift is not None:
@@ -73,21 +79,51 @@ def caveats_of(
     return Caveats(tuple(reasons), part, unsure)
 
 
-def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
-    """What to say of sensors and motors whose gain would be off by more than that of any is."""
-    gains: dict[str, str] = {}
-    for effect in best:
+def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tuple[str, ...]:
+    """What to say of effects, and of figures of a rig, that are farther off than any is: a channel
+    has another unit. By the `joint` fit, where there is one."""
+    problem, said = search.problem, dict[str, None]()
+    model: Model | None = getattr(problem, "model", None)
+    for effect in found:
         kind, _, channel = effect.partition(":")
-        if kind == "sensor_scale" and abs(values(search, best, effect)["k"].value) > GROSS:
-            gains[channel] = "sensor"
-        torque = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}.get(kind)
-        if torque and not 1 / MOTOR < values(search, best, effect)["k"].value < MOTOR:
-            gains[torque] = "motor"
-    return tuple(
-        f"the gain of {channel} would be off by more than any {what}'s is; its unit is wrong, or "
-        "its scale or offset in a map (--map)"
-        for channel, what in gains.items()
-    )
+        told = joint.values(problem.candidates[effect]) if joint else values(search, found, effect)
+        gain, limits = told["k"].value if "k" in told else 0.0, SENSOR
+        if kind in DRIVEN:
+            channel, limits = DRIVEN[kind], MOTOR
+        if kind in ("sensor_scale", *DRIVEN) and not limits[0] <= gain <= limits[1]:
+            whose = "motor" if kind in DRIVEN else "sensor"
+            off = f"the gain of {channel} would be off by more than any {whose}'s is"
+            said[f"{off}; its unit is wrong, or its scale or offset in a map (--map)"] = None
+        if kind == "extra_inertia" and model is not None:
+            axis = model.effect("drive_axis")
+            assert isinstance(axis, DriveAxis)
+            times = abs(told["J"].value) / axis.inertia
+            said |= dict.fromkeys(_of_rig(kind, times, times < HEAVY))
+        if (
+            model
+            and model.mechanism.rig == "cylinder"
+            and any("m" in v.unit for v in told.values())
+        ):
+            at = problem.operating_point()
+            if doubted := unit_in_doubt(at.x, at.stroke):
+                said[f"{doubted}; if it did not, `stroke` of the model may be what it moves"] = None
+    for figure, value in (joint.figures if joint else {}).items():
+        if joint and model and figure in RIG_FIGURES:
+            given = given_figure(model, *figure.rsplit(".", 1))
+            low, high = (
+                ends[joint.names.index(figure)] / given for ends in (joint.low, joint.high)
+            )
+            said |= dict.fromkeys(
+                _of_rig(figure, value / given, low < PLATE and high > 1.0 / PLATE)
+            )
+    return tuple(said)
+
+
+def _of_rig(name: str, times: float, right: bool) -> list[str]:
+    """That a figure is so many times the one given, unless that is `right`."""
+    units = "the unit of a channel is wrong (--map), or the rig's figures in the model"
+    said = f"{name} would be {times:.3g} times what the rig is said to have; {units}"
+    return [] if right else [said]
 
 
 def _unasked(search: Search, best: Hypothesis) -> Hypothesis:

@@ -40,6 +40,7 @@ MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
 END = 0.1  # share of the stroke within which a moving rod may be one in another unit
 SHARE = 0.2  # travel, as a share of the farthest place, from which a rod moves
+FOLLOWED = 0.1  # share of the travel that a row may be from the one before
 UNMOVED = 3.0  # a position with less travel than so many of its steps rests
 
 
@@ -255,16 +256,16 @@ def _travel(y: Array) -> float:
 def _remarks(log: Trajectory) -> Iterator[str]:
     name = log.meta["name"]
     yield from (f"{name}: {said}" for said in log.meta.get("read", ()))
-    if "piston/x" in log:
-        x, stroke = log["piston/x"], log.meta.get("stroke", 0.0)
-        farthest = float(np.nanmax(np.abs(x)))
-        if farthest < END * stroke and _travel(x) > SHARE * farthest:
-            yield (
-                f"{name}: piston/x stays within {1e3 * farthest:.3g} mm of the retracted end, of a "
-                f"stroke of {1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong "
-                "(see --map), and rates of frictions with it"
-            )
-    gaps = np.diff(log.time) > 5 * np.median(np.diff(log.time))
+    stroke = log.meta.get("stroke", 0.0)
+    if "piston/x" in log and (doubted := unit_in_doubt(log["piston/x"], stroke)):
+        yield f"{name}: {doubted}, and rates of frictions with it"
+    step = float(np.median(np.diff(log.time)))
+    if step > GateSettings.milliseconds and log.meta["kind"] != "vessel":
+        yield (
+            f"{name}: a row every {step:.3g} s: if the time was in milliseconds, all rates are "
+            "wrong (see --map)"
+        )
+    gaps = np.diff(log.time) > 5 * step
     if gaps.any():
         yield f"{name}: {int(gaps.sum())} gaps in time, the longest {np.diff(log.time).max():.3f} s"
     for column in needed(log):
@@ -272,6 +273,17 @@ def _remarks(log: Trajectory) -> Iterator[str]:
         missing = round(share * (1 + (log.time[-1] - log.time[0]) / step))
         if missing:
             yield f"{name}: {column}: {missing} readings missing"
+
+
+def unit_in_doubt(x: Array, stroke: float) -> str:
+    """That a rod which stays at `x` (n,) [m] may be one in another unit; empty where not."""
+    farthest = float(np.nanmax(np.abs(x)))
+    if farthest >= END * stroke or _travel(x) <= SHARE * farthest:
+        return ""
+    return (
+        f"piston/x stays within {1e3 * farthest:.3g} mm of the retracted end, of a stroke of "
+        f"{1e3 * stroke:.4g} mm: if the rod moved farther, its unit is wrong (see --map)"
+    )
 
 
 def sentence(faults: Iterable[KembaError]) -> str:
@@ -302,7 +314,15 @@ def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
 def _rig_time(log: Trajectory) -> Iterator[KembaError]:
     vessel = log.meta["kind"] == "vessel"
     faults = list(_clock(log, FEWEST_STILL if vessel else FEWEST))
-    yield from faults or ([] if vessel else _seldom(log, GateSettings.milliseconds))
+    if faults or vessel:
+        yield from faults
+    elif not all(_follows(log[n]) for n in needed(log) if n.endswith(("/x", "/q"))):
+        yield from _seldom(log, GateSettings.milliseconds)
+
+
+def _follows(y: Array) -> bool:
+    """Whether a channel changes by little of its travel from one row to the next."""
+    return bool(np.nanmedian(np.abs(np.diff(y))) < FOLLOWED * _travel(y))
 
 
 def _rig_readings(log: Trajectory) -> Iterator[KembaError]:

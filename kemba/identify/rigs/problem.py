@@ -324,13 +324,15 @@ class RigProblem(ColouredProblem):
         return {self.answer: np.concatenate(gaps)}
 
     def validate(self) -> list[str]:
-        """Raises BadData where columns must be mixed up."""
+        """Raises BadData where columns must be mixed up. Of its frictions this rig may have less
+        than the model, or more: they are fitted."""
+        model = self.model
+        kept = [effect for effect in model.effects if not effect.dissipative]
+        bare = Predictor(Model(model.mechanism, kept, model.supply, model.name), {})
         faults = [
             fault
             for log, sigma in zip(self.logs, self._sigma, strict=True)
-            for fault in contradictions(
-                log, self.model, sigma, lambda trial: self.predictor.gap(trial, {})
-            )
+            for fault in contradictions(log, model, sigma, lambda trial: bare.gap(trial, {}))
         ]
         if faults:
             raise BadData(faults)

@@ -180,7 +180,7 @@ DOUBTED = 2.0
 BLURRED = 3.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RigLog:
     """The filtered channels of one log; `doubt` (k,): share of a friction's size by which it is
     uncertain at each judged row, because the sign of the rate is."""

@@ -3,62 +3,133 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import product, starmap
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.errors import KembaError
-from kemba.identify.bench.validate import END, REVERSED, SMALL, Texts, simplest
+from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, simplest
 from kemba.identify.problem.types import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
 
 Gap = Callable[[RigLog], Array]  # the force of the model less that of the log, along a log
+Units = tuple[str, ...]  # channels in another unit
 LEAST = 0.15  # zero [rad] from which it is a mistake, and no fault of a sensor
 ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
 # factor from which a gain is another unit, and no other inertia: the closest usual units, feet and
 # metres, have 3.28
 UNIT = 3.0
 TIME = "the time"
-SIZES = np.linspace(-9.0, 9.0, 33)  # logarithms of those that are tried first
+WRONG = "(its unit is wrong)"
+SIZES = np.linspace(-9.0, 9.0, 25)  # logarithms of those that are tried first
+# within which speeds friction turns over, as shares of the model's: it tells no unit
+SHARP = np.geomspace(0.01, 30.0, 8)
+CLOSELY = 3e-3  # share of their distance to which it is found
+# work that no drive does for each kilogram that moves [W/kg]: the best motors alone do 1e4
+POWER = 2e4
+STEEL = 7800.0  # density of a rotor [kg.m-3]
+LARGEST = 95.0  # percentile of the rows that counts as the largest [%]
 
 
 def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` (k,) of the gap."""
-    answer = ANSWER[model.mechanism.rig]
-    side, still = 1.0 if model.mechanism.bore else -1.0, model.mechanism.sign_speed
-
-    def size(trial: RigLog) -> float:
-        force = trial.channels.others[answer][trial.channels.rows]
-        return float(np.linalg.norm(force / sigma))
-
-    def left(trial: RigLog) -> float:
-        """The share of the force that friction and damping of any size leave, which every rig may
-        have, and of a drive a zero of its force."""
-        known = [side * np.tanh(trial.speed / still), side * trial.speed]
-        if not model.mechanism.bore:
-            known += [np.ones(len(sigma)), -np.ones(len(sigma))]
-        columns = np.stack(known, axis=1) / sigma[:, None]
-        return float(nnls(columns, gap(trial) / sigma)[1]) / size(trial)
-
-    small = SMALL * np.sqrt(len(sigma)) / size(log)
-    if left(log) < small:
-        return []
-    trials = {texts: left(trial) for texts, trial in mix_ups(log, model, left)}
-    said = "; or ".join(map(" and ".join, simplest(trials, small)))
-    what = "the force answers the motion so much better then"
+    force = _Force(model, sigma, gap)
+    small = SMALL * np.sqrt(len(sigma)) / force.size(log)
     hint = "correct it in a column map (--map), or the rig's figures in the model"
-    return [KembaError(log.name, said, what, hint)] if said else []
+    if force.left(log) >= small:
+        trials = {texts: force.left(trial, units) for texts, trial, units in mix_ups(log, force)}
+        if simple := simplest(trials, small):
+            said = "; or ".join(map(" and ".join, simple))
+            if sum(WRONG in texts[-1] for texts in simple) > 1:  # no weight tells them apart
+                said += "; or several of these are"
+            what = "the force answers the motion so much better then"
+            return [KembaError(log.name, said, what, hint)]
+    if (work := force.work(log)) > POWER:
+        what = f"{force.answer} does {work:.2g} W for each kilogram that moves"
+        units = f"are {force.place}, {force.answer} or the time in other units? "
+        return [KembaError(log.name, what, f"no drive does more than {POWER:.0g}", units + hint)]
+    return []
 
 
-def mix_ups(
-    log: RigLog, model: Model, left: Callable[[RigLog], float]
-) -> Iterator[tuple[Texts, RigLog]]:
-    """What may be wrong with a log, and the log with that put right; `left` of one."""
-    rig, bore, logged = model.mechanism.rig, model.mechanism.bore, model.mechanism.logged
-    place, answer = PLACE[rig], ANSWER[rig]
+class _Force:
+    """The force of a log, and what the model, and friction and damping of any size, leave of it.
+
+    Every rig may have these, and a drive a zero of its force. Units of the force and of the time
+    are factors of what the model predicts at rest and of what accelerates, which are fitted.
+    """
+
+    def __init__(self, model: Model, sigma: Array, gap: Gap) -> None:
+        self.model, self.sigma, self.gap = model, sigma, gap
+        self.place, self.answer = PLACE[model.mechanism.rig], ANSWER[model.mechanism.rig]
+        self._seen: dict[tuple[RigLog, bool], Array] = {}
+
+    def read(self, log: RigLog) -> Array:
+        """The force (k,) that was measured at the judged rows."""
+        return np.asarray(log.channels.others[self.answer][log.channels.rows])
+
+    def size(self, log: RigLog) -> float:
+        """Its size in its noise."""
+        return float(np.linalg.norm(self.read(log) / self.sigma))
+
+    def left(self, log: RigLog, units: Units = (), sign: float = 1.0) -> float:
+        """The share of the force, of which `sign` times is read, that is left, with `units` of
+        force and time as they fit best."""
+        return self._fitted(log, units, sign)[0]
+
+    def factors(self, log: RigLog, units: Units, sign: float) -> dict[str, float]:
+        """By what the readings of force and time are too large."""
+        rest, moving = self._fitted(log, units, sign)[1]
+        found = {self.answer: rest, TIME: float(np.sqrt(moving / rest)) if rest else np.inf}
+        return {name: found[name] for name in units}
+
+    def _fitted(self, log: RigLog, units: Units, sign: float) -> tuple[float, tuple[float, float]]:
+        """The share that is left, and the factors of rest and motion."""
+        side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
+        known = [-side * np.tanh(log.speed / (sharp * still)) for sharp in SHARP]
+        known += [-side * log.speed]
+        if not self.model.mechanism.bore:
+            known += [np.ones(len(self.sigma)), -np.ones(len(self.sigma))]
+        force, rest = sign * self.read(log), self._predicted(log, TIME in units)
+        moving = self._predicted(log) - rest
+        free = [rest] * (self.answer in units) + [moving] * (TIME in units)
+        told = force - (0.0 if self.answer in units else rest)
+        columns = np.stack([*free, *known], axis=1) / self.sigma[:, None]
+        factors, left = nnls(columns, told / self.sigma)
+        first = float(factors[0]) if self.answer in units else 1.0
+        both = first, float(factors[len(free) - 1]) if TIME in units else first
+        return float(left) / self.size(log), both
+
+    def _predicted(self, log: RigLog, resting: bool = False) -> Array:
+        """What the model predicts (k,); `resting`: of an axis that does not accelerate."""
+        if (log, resting) not in self._seen:
+            trial, c = log, log.channels
+            if resting:
+                trial = replace(log, channels=replace(c, a=np.zeros_like(c.a)))
+            self._seen[log, resting] = self.gap(trial) + self.read(log)
+        return self._seen[log, resting]
+
+    def work(self, log: RigLog) -> float:
+        """The largest power of a drive for each kilogram that moves [W/kg], that of an axis that
+        turns in steel as long as it is wide; 0 of a cylinder."""
+        rig = self.model.mechanism
+        if rig.bore:
+            return 0.0
+        axis = {n: self.model.parameters[f"drive_axis.{n}"][1] for n in ("J", "m")}
+        mass = axis["J"]
+        if rig.logged[self.place] == "rad":
+            mass = np.pi * STEEL * (2.0 * axis["J"] / (np.pi * STEEL)) ** 0.6
+        power = np.percentile(np.abs(self.read(log) * log.speed), LARGEST)
+        return float(power) / max(mass + axis["m"], 1e-9)
+
+
+def mix_ups(log: RigLog, force: _Force) -> Iterator[tuple[Texts, RigLog, Units]]:
+    """What may be wrong with a log, the log with that put right, and its channels whose units are
+    to be fitted."""
+    place, answer, mechanism = force.place, force.answer, force.model.mechanism
+    bore, logged = mechanism.bore, mechanism.logged
     end = END if bore else f"{place} has the reversed sign"
     other = REVERSED if bore else f"{answer} has the reversed sign"
     pressures = list(_pressures({n: log.channels.others[n] for n in logged if n.endswith("/P")}))
@@ -66,21 +137,56 @@ def mix_ups(
         texts = (end,) * (sign < 0.0) + (other,) * (turned < 0.0) + said
         others = {**log.channels.others, answer: turned * log.channels.others[answer], **read}
         trial = _moved(log, sign, bore.stroke if bore and sign < 0.0 else 0.0, others)
-        yield texts, trial
+        yield texts, trial, ()
         if logged[place] == "rad":  # where it hangs straight down
-            zero = _best(ZEROS, partial(_moved, trial, 1.0, others=others), left)
+            zero = _best(ZEROS, partial(_moved, trial, 1.0, others=others), force.left)
             moved = f"{place} counts from another zero (`offset: {np.degrees(zero):+.1f} deg`)"
             if abs(zero) > LEAST:
-                yield (*texts, moved), _moved(trial, 1.0, zero, others)
+                yield (*texts, moved), _moved(trial, 1.0, zero, others), ()
         if not bore and turned > 0.0:
-            yield (*texts, f"{place} and {answer} are swapped"), _exchanged(trial, answer)
-        for name in () if said else (answer,) if bore else (place, answer, TIME):
-            size = _best(SIZES, partial(_scaled, trial, name), left)
-            times = np.exp(abs(size))
-            if times > UNIT:
-                about = f"{name} is about {float(f'{times:.2g}'):g} times"
-                wrong = f"{about} too {'small' if size > 0.0 else 'large'} (its unit is wrong)"
-                yield (*texts, wrong), _scaled(trial, name, size)
+            yield (*texts, f"{place} and {answer} are swapped"), _exchanged(trial, answer), ()
+        if not said and turned > 0.0:
+            for more, changed, units in _other_units(trial, force, other):
+                yield texts + more, changed, units
+
+
+def _other_units(
+    log: RigLog, force: _Force, reversed_: str
+) -> Iterator[tuple[Texts, RigLog, Units]]:
+    """Channels in other units, in words, where every factor is one of units and each of them is
+    needed; of a cylinder only the force tells its own. The force may be `reversed_` as well."""
+    drive = not force.model.mechanism.bore
+    free: list[Units] = [(force.answer,), *([(TIME,), (force.answer, TIME)] if drive else [])]
+    left: dict[tuple[float, Texts], float] = {}
+    tried = {size: _stretched(log, size) for size in (0.0, *SIZES)} if drive else {0.0: log}
+
+    def stretched(size: float) -> RigLog:
+        return tried[size] if size in tried else _stretched(log, size)
+
+    places: list[Units] = [(), (force.place,)] if drive else [()]
+    for sign, place, units in product((1.0, -1.0), places, [(), *free]):
+        error = partial(force.left, units=units, sign=sign)
+        size = _best(SIZES, stretched, error) if place else 0.0
+        trial, names = stretched(size), (*place, *units)
+        found = dict.fromkeys(place, float(np.exp(-size))) | force.factors(trial, units, sign)
+        if not all(0.0 < f < np.inf for f in found.values()):
+            continue
+        if TIME in units:
+            trial, units = _timed(trial, 1.0 / found[TIME]), tuple(n for n in units if n != TIME)
+        left[sign, names] = least = force.left(trial, units, sign)
+        fewer = (e for (s, some), e in left.items() if s == sign and some and {*some} < {*names})
+        if not names or any(error <= ALIKE * least for error in fewer):
+            continue
+        if not any(1.0 / UNIT < f < UNIT for f in found.values()):
+            answer = {force.answer: sign * trial.channels.others[force.answer]}
+            texts = (reversed_,) * (sign < 0.0) + tuple(starmap(_wrong, found.items()))
+            yield texts, _moved(trial, 1.0, 0.0, trial.channels.others | answer), units
+
+
+def _wrong(name: str, factor: float) -> str:
+    """A channel in another unit in words; by what `factor` it is too large."""
+    times = float(f"{max(factor, 1.0 / factor):.2g}")
+    return f"{name} is about {times:g} times too {'large' if factor > 1.0 else 'small'} {WRONG}"
 
 
 def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]]]:
@@ -103,16 +209,16 @@ def _moved(log: RigLog, gain: float, zero: float, others: dict[str, Array]) -> R
     return replace(log, channels=replace(c, others=others, **moved, **turned))
 
 
-def _scaled(log: RigLog, name: str, size: float) -> RigLog:
-    """A log with exp(size) times the readings of one channel, or times as long."""
-    gain, c, others = float(np.exp(size)), log.channels, log.channels.others
-    if name == TIME:
-        v, quick, a, width = c.v / gain, c.quick / gain, c.a / gain**2, gain * c.width
-        slower = replace(c, time=gain * c.time, width=width, v=v, quick=quick, a=a)
-        return replace(log, channels=slower)
-    if name in others:
-        return _moved(log, 1.0, 0.0, {**others, name: gain * others[name]})
-    return _moved(log, gain, 0.0, others)
+def _stretched(log: RigLog, size: float) -> RigLog:
+    """A log with exp(size) times the readings of its position."""
+    return _moved(log, float(np.exp(size)), 0.0, log.channels.others)
+
+
+def _timed(log: RigLog, gain: float) -> RigLog:
+    """A log that takes so many times as long."""
+    c = log.channels
+    v, quick, a, width = c.v / gain, c.quick / gain, c.a / gain**2, gain * c.width
+    return replace(log, channels=replace(c, time=gain * c.time, width=width, v=v, quick=quick, a=a))
 
 
 def _exchanged(log: RigLog, answer: str) -> RigLog:
@@ -132,4 +238,5 @@ def _best(
         return left(change(by))
 
     near, step = min(tried, key=error), tried[1] - tried[0]
-    return float(minimize_scalar(error, bounds=(near - step, near + step), method="bounded").x)
+    span, close = (near - step, near + step), {"xatol": CLOSELY * step}
+    return float(minimize_scalar(error, bounds=span, method="bounded", options=close).x)

@@ -64,9 +64,15 @@ def entry(function: Function) -> Function:
     return cast(Function, call)
 
 
-def is_kept(name: str) -> bool:
-    """Whether the folder holds machine code of a function of the kernel."""
-    return FOLDER is not None and any(Path(FOLDER).rglob(f"*.{name}-*.nbc"))
+def is_kept(function: Callable[..., Any]) -> bool:
+    """Whether the folder holds machine code of an `entry` as it stands in this installation: what
+    another one has left, or what was there before an update, numba compiles anew."""
+    made = function.__dict__["dispatcher"]
+    file = getattr(made._cache, "_cache_file", None)
+    try:
+        return bool(made.overloads) or (file is not None and bool(file._load_index()))
+    except (OSError, EOFError, pickle.UnpicklingError):  # a damaged cache
+        return False
 
 
 @contextmanager

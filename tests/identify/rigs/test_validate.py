@@ -99,7 +99,8 @@ def test_without_a_weight_another_unit_is_that_of_the_motion_or_of_the_force(
     small = column == "axis/q [m]"
     columns[column] = columns[column] * (0.1 if small else 10.0)
     log = Trajectory(TIME, columns, RUN | {"kind": "drive"})
-    with pytest.raises(BadData, match=r"axis/q is .* too small .*; or axis/tau is .* too large"):
+    words = r"axis/tau is .* too large .*; or axis/q is .* too small .*; or several of these are"
+    with pytest.raises(BadData, match=words):
         rig_problem([log], load_model(tmp_path / "model.yaml")).validate()
 
 
@@ -211,10 +212,22 @@ def test_a_small_motion_near_the_end_is_read_and_said(place: float, tmp_path: Pa
     assert len(said) == (place < 0.01) and all("its unit is wrong" in line for line in said)
 
 
+def test_what_hangs_on_a_position_in_doubt_is_not_written(tmp_path: Path) -> None:
+    """Tenths of the position: the damping would be ten times and more that of the rig."""
+    rig_of(tmp_path)
+    read, log = cylinder(12.0), tmp_path / "log.csv"
+    read["piston/F [N]"] -= 200.0 * 0.03 * 1.3 * np.cos(1.3 * TIME)
+    for share in (1.0, 0.1):
+        Trajectory(TIME, {**read, "piston/x [m]": share * read["piston/x [m]"]}, RUN).write(log)
+        answer, _ = discover_logs([log], (), str(tmp_path / "model.yaml"))
+        assert answer.writes == (share == 1.0)
+        assert ("of the retracted end" in answer.sentence) == (share < 1.0)
+
+
 @pytest.mark.parametrize(
     ("scale", "words"),
     [
-        (1000.0, r"log: has a row every 2 s; at least 2 rows a second; is the time in millis"),
+        (1000.0, r"log: the time is about (1000|9\d0) times too large \(its unit is wrong\); "),
         (100.0, r"log: the time is about (100|99) times too large \(its unit is wrong\); "),
         (0.1, r"log: the time is about (10|9\.\d) times too small \(its unit is wrong\); the"),
     ],
@@ -248,7 +261,113 @@ def test_a_motor_of_another_unit_beside_a_heavier_axis_is_no_effect(tmp_path: Pa
     assert not answer.writes and "off by more than any motor's is; its unit" in answer.sentence
 
 
+@pytest.mark.parametrize("friction", [0.1, 0.0])
+def test_less_friction_than_the_model_has_hides_no_mistake(friction: float) -> None:
+    """What the model has too much of, no friction of any size puts right."""
+    model, force = load_model("pendulum_rig"), FORCE + (friction - 0.4) * np.tanh(V / 0.01)
+    right = pendulum(Q, force)
+    assert rig_problem([right], model).validate() == []
+    for log, words in (
+        (pendulum(Q + 0.6, force), r"axis/q counts from another zero \(`offset: -34\.\d deg`\); "),
+        (Trajectory(100.0 * TIME, right.columns, right.meta), r"the time is about (99|100) times"),
+    ):
+        with pytest.raises(BadData, match=words):
+            rig_problem([log], model).validate()
+
+
 def test_friction_and_small_zeros_are_no_mistakes() -> None:
     """These are for `discover` to find."""
     log = pendulum(Q + 0.1, FORCE + 1.5 * np.tanh(V / 0.01))
     assert rig_problem([log], load_model("pendulum_rig")).validate() == []
+
+
+@pytest.mark.parametrize(
+    ("q", "tau", "time", "words"),
+    [
+        (
+            1e3,
+            1e3,
+            1.0,
+            r"axis/q is about 1000 times .* and axis/tau is about 1000 times too large",
+        ),
+        (
+            57.3,
+            8.85,
+            1.0,
+            r"axis/q is about 5[78] times .* and axis/tau is about 8.[789] times too",
+        ),
+        (
+            57.3,
+            1e3,
+            100.0,
+            r"about 57 times .* axis/tau is about (1000|9[89]0) .* the time is about (99|100) ",
+        ),
+    ],
+)
+def test_several_units_at_once_are_named(q: float, tau: float, time: float, words: str) -> None:
+    right = pendulum(Q, FORCE)
+    columns = {"axis/q [rad]": q * right["axis/q"], "axis/tau [N.m]": tau * right["axis/tau"]}
+    log = Trajectory(time * TIME, columns, right.meta)
+    with pytest.raises(BadData) as raised:
+        rig_problem([log], load_model("pendulum_rig")).validate()
+    assert re.search(words, str(raised.value)), str(raised.value)
+
+
+@pytest.mark.parametrize("rotary", [False, True])
+def test_a_motion_that_no_drive_has_strength_for_is_of_other_units(
+    rotary: bool, tmp_path: Path
+) -> None:
+    """Thousandths of both: without a weight the force answers the motion as well as before."""
+    q, tau, inertia = ("rad", "N.m", 0.02) if rotary else ("m", "N", 2.0)
+    rig = {"kind": "drive", "motion": "rotary" if rotary else "linear"}
+    dump_yaml({"rig": rig | {"inertia": f"{inertia} {'kg.m2' if rotary else 'kg'}"}},
+              tmp_path / "model.yaml")  # fmt: skip
+    model, force = load_model(tmp_path / "model.yaml"), inertia * (A + 1.5 * np.tanh(V / 0.01))
+    for factor in (1.0, 1e3):
+        columns = {f"axis/q [{q}]": factor * Q, f"axis/tau [{tau}]": factor * force}
+        problem = rig_problem([Trajectory(TIME, columns, RUN | {"kind": "drive"})], model)
+        if factor == 1.0:
+            assert problem.validate() == []
+        else:
+            with pytest.raises(BadData, match=r"axis/tau does .* W for each kilogram that moves"):
+                problem.validate()
+
+
+def test_an_inertia_far_from_that_of_the_rig_is_not_written(tmp_path: Path) -> None:
+    """Friction hides that motion and time are in other units: what is left is no inertia."""
+    rig = {"kind": "drive", "inertia": "2 g"}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    force = 0.2 * A + 6.0 * np.tanh(V / 0.01)
+    noise = 0.05 * np.random.default_rng(0).standard_normal(len(TIME))
+    columns = {"axis/q [m]": Q, "axis/tau [N]": force + noise}
+    Trajectory(TIME, columns, {"kind": "drive"}).write(tmp_path / "log.csv")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), str(tmp_path / "model.yaml"))
+    assert not answer.writes
+    assert re.search("would be .* times what the rig is said to have|its unit", answer.sentence)
+
+
+def test_a_rig_slower_than_two_rows_a_second_is_read_and_asked_about() -> None:
+    """An axis that creeps, a row every two seconds; one that turns between two rows is too fast."""
+    model, slow = load_model("drive_rig"), np.arange(0.0, 800.0, 2.0)
+    force = 20.0 * np.tanh(np.cos(0.02 * slow) * 0.02 / 1e-3)
+    for rate in (0.02, 2.0):
+        columns = {"axis/q [m]": np.sin(rate * slow), "axis/tau [N]": force}
+        log = Trajectory(slow, columns, RUN | {"kind": "drive"})
+        if rate < 1.0:
+            assert any(
+                "if the time was in milliseconds" in said for said in check_all([log], model)
+            )
+        else:
+            with pytest.raises(BadData, match="has a row every 2 s; at least 2 rows a second"):
+                check_all([log], model)
+
+
+def test_friction_of_an_axis_that_creeps_is_found(tmp_path: Path) -> None:
+    """How smoothly it turns over behind a filter of many seconds is no other unit."""
+    time, noise = np.arange(0.0, 800.0, 2.0), np.random.default_rng(0).standard_normal(400)
+    force = 20.0 * np.tanh(np.cos(0.02 * time) * 0.02 / 1e-3) + 0.3 * noise
+    columns = {"axis/q [m]": np.sin(0.02 * time), "axis/tau [N]": force}
+    Trajectory(time, columns, {"kind": "drive"}).write(tmp_path / "log.csv")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), "drive_rig")
+    assert answer.sure == ("axis_friction",)
+    assert answer.ranking[0].parameters["F_c"].value == pytest.approx(20.0, abs=1.0)
