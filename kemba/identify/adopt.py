@@ -141,8 +141,7 @@ def adopt_answer(folder: str | Path, out: Path, only_sure: bool = False) -> tupl
 
 
 def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
-    """An answer without some of its effects: what the others are, these being absent, as its joint
-    covariance tells."""
+    """An answer without some of its effects: what the others are then, by its joint covariance."""
     found = {**answer, "added": [e for e in answer["added"] if e not in dropped]}
     joint = answer.get("covariance")
     if not dropped or not joint:

@@ -92,13 +92,7 @@ def what_shows(search: Search, test: NullTest) -> Identifiability:
 
 
 def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> Discovery:
-    """The answer from a first guess on.
-
-    Another structure that leaves far less unexplained is built in at once: what else is missing
-    shows only then. Any other is built in where the search names it and its answer is not complete,
-    or a mixture of both structures, which no machine is. Of both answers the one with the smaller
-    error on left-out data counts; a complete one counts more than a mixture.
-    """
+    """The answer from a first guess on, of this structure or another that leaves far less."""
     guessed = search.problem.structures & set(guess)
     least = 0.0 if guessed else SearchSettings.structural
     theta = search.points[guess].fit.theta
@@ -206,8 +200,7 @@ def _add(answer: Answer, joint: JointFit) -> None:
 
 
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:
-    """What logs allow to say that are too short for anything to be significant: whether something
-    differs, but not what."""
+    """What logs tell that are too short for significance: whether something differs, not what."""
     gain, caveats = best_gain(search), Caveats()
     differs = test.share(gain) <= DiscoverSettings.significant
     if differs or error(search, NULL, kept) > VerdictSettings.whole:

@@ -139,8 +139,7 @@ def discover_logs(
 
 
 def _searching(limit: float, begun: float) -> float:
-    """The time [s] for the search of an answer that may take `limit`, after `begun`. Raises
-    KembaError where there is none."""
+    """Time [s] for the search within `limit`, after `begun`. Raises KembaError."""
     left = limit - begun - ENDS * begun - DRAWN
     if left < 0.0:
         need = (1.0 + BEGINS + ENDS) * begun + DRAWN
@@ -163,9 +162,7 @@ def _kept_aside(
 
 
 def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: str) -> Problem:
-    """Tell the errors on quoted logs as `compare` does, of the model as it is (`judge`), and of
-    the one that is written; what does not predict better there is not written. Returns the logs
-    under the better one, with their noise."""
+    """Tell errors as `compare` does; drop a model that is no better. The better one's problem."""
     before = answer.error_before, answer.error_after
     evidence, judge = load_spec(model).evidence, _with_noise(judge)
     stated = error_ratio(judge, _figures_felt(judge, evidence.figures if evidence else {}))
@@ -193,8 +190,7 @@ def _evidence(
     kept: Sequence[Trajectory],
     model: str,
 ) -> dict[str, Any] | None:
-    """What the model that is written rests on, as its YAML says it; None where none is written.
-    `judge`: the quoted logs under it."""
+    """What the written model rests on, as its YAML says it; `judge`: quoted logs under it."""
     if not answer.writes:
         return None
     used = [*((log, "learnt") for log in fitted), *((log, "quoted") for log in kept)]

@@ -74,8 +74,7 @@ def smooth_motion(
 
 
 def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
-    """Even times (m,) [s] of about the same step, x (m,) there, and the step [s]; rows without a
-    value are bridged."""
+    """Even times (m,) [s], x (m,) there, rows without a value bridged, and the step [s]."""
     good = np.isfinite(x)
     step = float(np.median(np.diff(time)))
     count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
@@ -86,12 +85,7 @@ def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
 def _adaptive(
     values: Array, sigma: float, step: float, colour: ChannelNoise
 ) -> tuple[Array, Array, Array]:
-    """Position, rate and its error, over the window that is chosen sample by sample.
-
-    A cubic cannot follow every motion. A quintic in the same window follows more of them. The
-    square of their difference, without the share that noise has in it, estimates the square of the
-    cubic's bias.
-    """
+    """Position, rate, its error, over windows of least risk: the quintic tells the cubic's bias."""
     n = len(values)
     best = np.full(n, np.inf)
     position, rate = values.copy(), np.zeros(n)
@@ -129,10 +123,7 @@ def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> A
 def _weigh_in(
     grid: Array, rate: Array, spread: Array, time: Array, v: Array
 ) -> tuple[Array, Array]:
-    """The mean of measured and derived velocity, weighted by their errors.
-
-    Where the two contradict each other, the derived one counts alone.
-    """
+    """Measured and derived velocity by their errors; the derived one where they contradict."""
     good = np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
     sigma = max(difference_sigma(v[good]), FINEST_SPEED)
@@ -203,8 +194,7 @@ def _quiet(time: Array, x: Array) -> _Quiet | None:
 
 
 def _expected(memory: float, step: float) -> Array:
-    """Autocovariances (1, lags) of what the cubic leaves of noise of unit sigma and this memory
-    [s], on an even grid of this `step` [s]."""
+    """Autocovariances (1, lags) of what the cubic leaves of unit noise with this memory [s]."""
     width, lags = QUIET_WIDTH, np.array(ColourSettings.lags)
     left = np.eye(1, 4 * width + 1, 2 * width)[0]
     left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
@@ -306,21 +296,14 @@ def _seen_within(time: Array) -> float:
 
 
 def _noise_of(channel: str, y: Array) -> float:
-    """White noise (1 sigma) of a sample, from readings y (n,), in their unit.
-
-    It is never below a small least noise, so that simulated logs without any noise can be judged.
-    """
+    """White noise (1 sigma) of a sample of y (n,); not zero even in a simulation without noise."""
     least = FINEST_FORCE if channel == "piston/F" else FINEST_PRESSURE
     spread = float(np.ptp(y[np.isfinite(y)]))
     return max(difference_sigma(y), least + FINEST_SHARE * spread)
 
 
 def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
-    """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
-
-    Where a valve switched within a gap, the moment is not known. The rows after such a gap count
-    again when the chambers no longer depend on that moment.
-    """
+    """Rows (n,) in and just after gaps; longer where a valve switched within, unknown when."""
     known = np.flatnonzero(good)
     wide = np.flatnonzero(np.diff(time[known]) > GAP)
     hidden = np.zeros(len(time), dtype=bool)

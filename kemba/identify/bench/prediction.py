@@ -110,10 +110,7 @@ class RigModel:
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
-    """Times of samples, switching instants and sub-steps (m,), and places (n,) of the samples.
-
-    m depends on the number of events only, so that compiled functions can be used again.
-    """
+    """Times (m,) of samples, switchings and sub-steps, and places (n,) of samples."""
     inside = np.clip(events, samples[0], samples[-1])
     pieces = np.ceil(np.diff(samples) / STEP - 1e-6).astype(int)
     fill = [
@@ -249,11 +246,7 @@ def settle_starts(logs: Iterable[BenchLog], predictor: BenchPredictor) -> tuple[
 
 
 def _timed(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
-    """A slow log with the variance that the unknown moments of its switchings make.
-
-    Each command was sent at any time between two rows. So its moment has the standard deviation of
-    a row over sqrt(12), and a reading that of the change between the first and the last moment.
-    """
+    """A slow log with the variance of commands sent at any time between two rows."""
     if not log.seen_within:
         return log
     early, late = (predictor.readings(log.sent(by * log.seen_within), {}, {}) for by in (-0.5, 0.5))

@@ -274,8 +274,7 @@ class BenchProblem(ColouredProblem):
         return dict(zip(parts, self.whiten(columns).T, strict=True))
 
     def _along(self, theta: Theta, index: int) -> tuple[SmoothedMotion, Array, float]:
-        """Of one log: the motion without the position sensor's faults, the share (n, 2) of each
-        sample's neighbourhood in which the valves act, the stroke [m]."""
+        """Of one log: true motion, share (n, 2) of each valve acting by then, stroke [m]."""
         log, predictor = self.logs[index], self.predictor
         acting = predictor.acting(log, theta)
         return predictor.true_motion(log, theta), acting, self.model.mechanism.stroke
@@ -299,8 +298,7 @@ class BenchProblem(ColouredProblem):
         return Leftover(residual, columns, run)
 
     def _imperfection(self, index: int) -> Array:
-        """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
-        be there with a small share of its size."""
+        """Spread (n,), in noise units, of the force if every effect may be there a little."""
         base = self.standardised({}, index)[FORCE]
         power, spike = np.ones(len(base)), SpikeSlabSettings.spike
         for c in self.candidates.values():

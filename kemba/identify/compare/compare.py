@@ -140,9 +140,7 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
 
 
 def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
-    """Error ratio of what the figures' tolerance leaves; whether it is within the noise, under each
-    condition nearly so, and the figures are not too far off. One condition of many may be a little
-    worse by chance."""
+    """Error ratio of what tolerances leave; whether it is within the noise nearly everywhere."""
     if found.q_value < BinSettings.false_discoveries:
         return rms(window.sums(found.left)), False
     sums = window.sums(found.left)

@@ -95,8 +95,7 @@ def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
 
 
 def _force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
-    """The missing force of a channel by bins of the quantity `label`, fitted to `residual` (n,);
-    None where the quantity hardly varies."""
+    """The missing force by bins of the quantity `label`; None where that hardly varies."""
     values = channel.quantities[label]
     edges = bins(values)
     if edges is None:

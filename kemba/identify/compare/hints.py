@@ -176,11 +176,7 @@ def conflicts(rows: Rows, r: Array, known: Slopes) -> list[Hint]:
 
 
 def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hint]:
-    """Each effect's switch with one value per group against one value for all.
-
-    `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
-    same in all groups.
-    """
+    """Each effect's switch with one value per `group` (n,) of rows against one value for all."""
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -200,12 +196,7 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
 
 
 def _agreement(information: Array, pull: Array) -> float:
-    """p value of one value for all groups.
-
-    `information` (g, g) on a value for each group; `pull` (g,): slope of the log likelihood where
-    all values are zero. No model is exact: each group's value may be off by the share of its size
-    that the spike of the prior allows.
-    """
+    """p value of one value for all groups, from `information` (g, g) and `pull` (g,) at zero."""
     if len(pull) < 2:
         return 1.0
     imperfect = SpikeSlabSettings.spike

@@ -111,8 +111,7 @@ def _virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
 
 
 def _colour(rows: float) -> Colour:
-    """Colour of white noise of the force sensor and of what no model explains, in units of the
-    former."""
+    """Colour of the sensor's white noise with what no model explains, in units of the former."""
     settings, rng = ExperimentSettings, np.random.default_rng(0)
     keep = float(np.exp(-1.0 / (rows * settings.memory)))
     slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(settings.sample))
@@ -217,9 +216,7 @@ def _reachable(places: Array, reach: float) -> Array:
 def _spans(
     weights: Array, duration: float, pulses: int, dwell: float
 ) -> tuple[tuple[float, float], ...]:
-    """Spans in which a valve is on: `weights` (2 pulses,) share the time among breaks and pulses,
-    each of which lasts at least `dwell` [s] where the time suffices; the last break takes a mean
-    share."""
+    """Spans in which a valve is on: `weights` (2 pulses,) share the time, `dwell` [s] at least."""
     weights = np.append(weights, 0.5) + 1e-3
     dwell = min(dwell, 0.5 * duration / len(weights))
     parts = dwell + weights / weights.sum() * (duration - dwell * len(weights))
@@ -238,9 +235,7 @@ def beginnings(count: int, seed: int) -> Array:
 
 
 def _plain(places: int, pulses: int) -> Iterator[Array]:
-    """Courses that a person would think of: a rod at rest, one slow stroke, strokes to and fro;
-    each with the valves in turn, and
-    several times with both of them together."""
+    """A rod at rest, a slow stroke, strokes to and fro, each with valves in turn and together."""
     ways = [
         np.full(places, 0.5),
         np.linspace(0.05, 0.95, places),
@@ -258,12 +253,7 @@ def _best_point(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> tuple[Array, int]:
-    """The point (k,) of the unit cube that is worth most, as far as a bounded search finds it, and
-    how many were tried.
-
-    `begin` (m, k): the first points that are tried. `bounded`: stop when the time is over; without
-    it the answer depends on nothing but the seed.
-    """
+    """The point (k,) of the unit cube worth most in a search from `begin` (m, k); tries."""
     settings, started = DesignSearchSettings, time.monotonic()
     seen: list[tuple[float, Array]] = []
 

@@ -169,12 +169,7 @@ def _design_motion(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> tuple[Tried, list[Tried], int] | None:
-    """The standard sway, those that tell the rivals apart best, and how many were simulated;
-    `bounded`: in about a minute.
-
-    None where logs of a robot cannot show two of the rivals. Raises KembaError where the robot has
-    one leg, or none of the sways is safe.
-    """
+    """The standard sway, all safe ones, the best first, and how many were simulated."""
     if len(model.mechanism.legs) < 2:
         raise KembaError(model.name, "stands on one leg; no safe motion is known for it")
     settings, search = SwaySettings, DesignSearchSettings
@@ -253,8 +248,7 @@ def _sways(count: int, seed: int, height: float, best: Callable[[], list[Tried]]
 
 
 def _sway(point: Array, height: float) -> Sway:
-    """The sway of a point (4,) of the unit cube, of hips at this height [m]; its angle is as large
-    as the acceleration allows, where that is less."""
+    """The sway of a point (4,) of the unit cube, its acceleration limited for hips at `height`."""
     s = SwaySettings
     plain = Sway(
         angle=1.0,

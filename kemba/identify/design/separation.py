@@ -155,9 +155,7 @@ def _own(problem: Problem, effect: str) -> tuple[str, ...]:
 
 
 def _left(gap: Array, figures: Array, free: Array) -> float:
-    """Half the squared distance that is left of a gap (n,) between two predictions where columns
-    may bend: those of `figures` (n, k), per prior width, at the price of their prior, `free` ones
-    at none."""
+    """Half the squared distance left of a gap (n,) if `figures` bend at their prior's price."""
     count, rows = figures.shape[1], np.hstack([figures, free])
     priced = np.vstack([rows, np.eye(count, rows.shape[1])])
     whole = np.concatenate([gap, np.zeros(count)])

@@ -31,12 +31,7 @@ def with_learnt_colour(
 
 
 def _with_drift(problem: Problem, theta: Theta) -> Problem:
-    """The problem with drifting sensors, where the logs are clearly likelier so.
-
-    A wrong sensor or length explains some of a drift, and so does friction. The drift itself
-    explains more of it. Where the motion moves it is asked for only where a sensor or a length is
-    wrong at theta: there the question takes seconds.
-    """
+    """The problem with drifting sensors, where the logs are clearly likelier so."""
     drifting = problem.drifting()
     if drifting is None:
         return problem

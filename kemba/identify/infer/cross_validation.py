@@ -60,8 +60,7 @@ def one_part_shows(search: Search, hypothesis: Hypothesis, against: Hypothesis =
 def _distances(
     search: Search, hypothesis: Hypothesis, against: Hypothesis, fine: bool = False
 ) -> Array:
-    """How far apart the predictions of two hypotheses are in each part of the logs (p,): sum of
-    squares in noise units, twice what the right one of them is expected to gain there."""
+    """Squared distance (p,) of two predictions in each part: twice the gain expected there."""
     ours, theirs = (search.points[h].linear for h in (hypothesis, against))
     other = dict(zip(theirs.names, theirs.at.tolist(), strict=True))
     step = np.array([other.get(n, z) - z for n, z in zip(ours.names, ours.at, strict=True)])
@@ -123,13 +122,7 @@ def gained(gains: Array, distances: Array) -> Gain:
 
 
 def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: bool = False) -> Array:
-    """Sum of squares (p,) that `judged` has of each part of the logs under the fit to all others.
-    The parts are runs, as a rule; `fine`: quarters of runs.
-
-    A left-out part judges the hypothesis alone: all other effects are absent, and no nominal
-    figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
-    only the first ones show it.
-    """
+    """Sum of squares (p,) of each part under the fit to all others, other effects absent."""
     linear, parts, found = point.linear, folds(search, fine), []
     for part in np.unique(parts):
         mask = parts == part

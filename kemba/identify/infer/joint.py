@@ -277,8 +277,7 @@ def _as_written(
     covariance: Array,
     remarks: list[str],
 ) -> JointFit:
-    """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
-    reciprocal as what it is the reciprocal of, all within their bounds."""
+    """The estimate in the catalogue's names and units, within bounds."""
     value, low, high = (x.copy() for x in triple)
     told, slope, figures = [], np.ones(len(names)), dict[str, Any]()
     ends = np.stack([low, high], axis=1)

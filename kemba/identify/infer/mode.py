@@ -78,8 +78,7 @@ def _at(
     r: Array,
     slopes: tuple[Linear, Array, Labels],
 ) -> Mode:
-    """The problem about theta, where the residual is r (n,). What linear evidence promises beyond
-    it may not be there: points are compared by their `cost`."""
+    """The problem about theta, where the residual is r (n,)."""
     linear, jacobian, blocks = slopes
     about = moved(linear, priors(problem, theta, linear.names)[0], jacobian, r, blocks)
     return Mode(dict(theta), about, r, _cost_at(problem, hypothesis, theta, r, linear))
@@ -99,11 +98,7 @@ def _ranker(problem: Problem, linear: Linear, absent: Collection[str] = ()) -> R
 
 
 def _possible(problem: Problem, hypothesis: Hypothesis, linear: Linear) -> dict[str, float]:
-    """Theta of the best fit with every switch on its possible side.
-
-    What would be on the impossible one is absent, and all others are fitted without it. Effects
-    that are not named have their usual shapes; another structure stays as it is.
-    """
+    """Theta of the best fit in which what would be on an impossible side is absent."""
     absent: set[str] = set()
     free = {n: c for n, c in problem.candidates.items() if n not in hypothesis}
     while True:

@@ -222,12 +222,7 @@ class Baseline:
         return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
 
     def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
-        """Learn the noise colour from the residual that is left when every effect may help to
-        explain.
-
-        A residual of the null would not do: a missing effect would pass for coloured noise. Returns
-        the Jacobian at theta under the new colour when it is wanted (`keep`).
-        """
+        """Learn the colour beside all effects; the Jacobian under it if wanted (`keep`)."""
         if not self.problem.learns_colour or self.problem.moves:
             return None  # where the motion moves, the search learns the colour with it
         blocks = self.division.blocks

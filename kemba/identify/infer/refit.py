@@ -227,8 +227,7 @@ class _LeastSquares:
         return bounded(self.problem.residual(self._theta(x)), self.settings.absurd)
 
     def _slopes(self, x: Array, r: Array) -> tuple[Array, Array]:
-        """Which of x (k,) have slopes of their own at x, where the residual is r (n,), and these
-        (n, c): the figures that are curved, and the effects' parameters."""
+        """Which of x (k,) have slopes of their own (curved, or effects), and these (n, c)."""
         n, settings = len(self.nuisance), self.settings
         curved = [self.nuisance.index(name) for name in self.curved]
         at = np.array([*curved, *range(n, len(x))], dtype=int)

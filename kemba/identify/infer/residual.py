@@ -98,11 +98,7 @@ FOLDS = 5  # blocks of time that are left out in turn: five
 
 
 def _structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
-    """Mean square of the residual in noise units, and the part of it that repeats itself.
-
-    A regression on everything that a force could depend on is learnt on some blocks of time. What
-    it predicts in the other blocks is structure: noise cannot be predicted, however coloured.
-    """
+    """Mean square of the residual in noise units, and the part that other folds predict."""
     left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
     if left_over is None:
         return 1.0, 0.0
@@ -116,10 +112,7 @@ def _structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
 
 
 def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
-    """Residual (n,) that a ridge regression on the other folds predicts for each fold.
-
-    `columns` (n, m): regressors; `folds` (n,): fold of each row.
-    """
+    """Residual (n,) that a ridge regression on the other folds predicts for each."""
     predicted = np.zeros(len(r))
     for fold in np.unique(folds):
         out = folds == fold

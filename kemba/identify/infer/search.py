@@ -108,8 +108,7 @@ class Search:
         return self._swap(self._grow(best)) if best else best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
-        """Repeat the search along the motion that the best hypothesis makes of the data, until the
-        best hypothesis stays the same."""
+        """Repeat the search along the motion that the best hypothesis makes, until it stays."""
         for _ in range(SearchSettings.followed):
             if best == NULL or self.ended:
                 return best
@@ -126,10 +125,7 @@ class Search:
         return self._round(NULL, SearchSettings.leaders)
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
-        """Find the motion again with an answer of several effects, and let it grow from there.
-
-        Each effect that joins changes the motion, and with it what the others seem to be.
-        """
+        """Find the motion again with several effects, each of which changes it, and grow."""
         for _ in range(SearchSettings.regrown):
             if len(best) < 2 or self.ended:
                 break
@@ -143,8 +139,7 @@ class Search:
         return best
 
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
-        """Find the motion that a hypothesis makes of the data, until late sensors stay as late; the
-        best theta there."""
+        """Find the motion of a hypothesis until late sensors stay as late; the best theta."""
         settings, theta = SearchSettings, self.points[hypothesis].fit.theta
         asked = self.problem
         for _ in range(settings.settled):
@@ -172,8 +167,7 @@ class Search:
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
-        """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
-        or more; the best of all points so far."""
+        """Refit `given` with one more effect, of the likeliest ones; the best of all points."""
         self._refit_leaders(given, leaders, least)
         if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
             for structure in sorted(self.problem.structures):
@@ -251,12 +245,7 @@ class Search:
         return self.points[hypothesis]
 
     def _take_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
-        """From here on a refitted effect counts by its secant, no longer by its slope at nothing.
-
-        Under every hypothesis each absent effect may be there with a small share of its size. Far
-        from nothing its slope promises more than the effect can do: a wrong hypothesis would look
-        good because of a sensor that is late by several rows, which it does not name.
-        """
+        """A refitted effect counts by its secant: far from nothing its slope promises too much."""
         problem, (effect, *others) = self.problem, hypothesis
         candidate = problem.candidates[effect]
         if others or not problem.moves or problem.is_straight(candidate.key):
@@ -270,8 +259,7 @@ class Search:
             self._secants = True
 
     def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
-        """The problem about a refitted point: slopes of its own parameters are those of the fit,
-        all others are the null's."""
+        """The problem about a refit: own slopes are those of the fit, all others the null's."""
         names, base = names_of(self.problem, fit.theta), self.base
         known = {n: i for i, n in enumerate(base.point.linear.names)}
         own = {i: fit.columns[n] for i, n in enumerate(names) if n in fit.columns}
@@ -282,8 +270,7 @@ class Search:
         return base.judged(hypothesis, fit, names, slopes)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Where a refit starts: at its last result, or at the linear estimate from the largest part
-        of the hypothesis that was refitted."""
+        """Where a refit starts: its last result, or the linear estimate from its largest part."""
         if hypothesis in self._thetas:
             return self._thetas[hypothesis]
         parts = [h for h in self.points if set(h) < set(hypothesis)]

@@ -87,9 +87,7 @@ def simplest(search: Search, selection: Selection) -> Selection:
 
 
 def _thin(search: Search, best: Hypothesis) -> None:
-    """Refit the answer with ever fewer effects: each time without the one that is missed least, for
-    as long as the error stays within one standard error of the smallest, and until the answer is
-    due."""
+    """Refit with ever fewer effects while the error stays within one standard error."""
     rest = least = best
     while len(rest) > 1 and not search.late:
         smaller = _parts_of(rest)
@@ -137,10 +135,7 @@ def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool
 
 
 def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Selection:
-    """A smaller hypothesis selected. Others with as many effects that predict as well, within
-    one standard error, are its rivals, whatever their evidence is, which did not count for the
-    larger one either; those that predict worse are dismissed, and so are larger ones that predict
-    no better, or that add an effect which was left out."""
+    """A smaller hypothesis selected, as good ones its rivals, worse or larger ones dismissed."""
     rivals, dismissed = [], {selection.best, *selection.dismissed}
     dropped = set(selection.best).union(*selection.dismissed) - set(chosen)
     for other in search.points:

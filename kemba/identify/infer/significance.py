@@ -102,11 +102,7 @@ def _slopes(ranker: Ranker, noise: Array) -> Array:
 
 
 def _evidence(ranker: Ranker, effects: Sequence[str], slopes: Array, tolerance: float) -> Array:
-    """Log evidence (1 + e, draws) of nothing and of each effect alone, up to a term that all share.
-
-    From one factor: only the prior width of one parameter differs (Sherman and Morrison). What
-    cannot be negative gains by its sign.
-    """
+    """Log evidence (1 + e, draws) of nothing and of each effect alone (Sherman, Morrison)."""
     width, wide = (ranker.widths(h, tolerance) for h in ((), tuple(effects)))
     lower = precision_factor(ranker.linear.gram.sum(axis=0), width)
     root = solve_triangular(lower, np.diag(width), lower=True)

@@ -71,8 +71,7 @@ def ahead(problem: Problem, theta: Mapping[str, float], error: float) -> Rebuilt
 
 
 def _unexplained(problem: Problem, theta: Mapping[str, float]) -> float:
-    """Nats per row that are left when every effect within this structure may help, by a linear
-    step from theta."""
+    """Nats per row left when every effect within this structure may help, by a linear step."""
     other = {problem.candidates[name].key for name in problem.structures}
     names = [name for name in names_of(problem, theta) if name not in other]
     linear, jacobian, r = linearise(problem, theta, time_blocks(problem), names)

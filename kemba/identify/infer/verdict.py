@@ -91,8 +91,7 @@ def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
 
 
 def _unasked(search: Search, best: Hypothesis) -> Hypothesis:
-    """Effects of an ended search's answer that nothing else was asked for: smaller answers, and
-    sensors that drift instead of being wrong, come last."""
+    """Effects of an ended search's answer that no smaller answer or drift was asked for."""
     asked_smaller = len(best) == 1 or not search.late
     return tuple(e for e in best if is_fault(e)) if asked_smaller else best
 

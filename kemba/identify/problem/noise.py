@@ -174,8 +174,7 @@ def difference_sigma(values: Array) -> float:
 
 
 def _spread_of_smallest(share: float) -> float:
-    """Root mean square of the `share` of a normal's values that are smallest in size, by its own
-    sigma."""
+    """Root mean square of the `share` of a normal's values that are smallest."""
     normal = NormalDist()
     end = normal.inv_cdf(0.5 * (1.0 + share))
     return float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / share))

@@ -131,11 +131,7 @@ class Problem(ABC):
         yield {name: value + h}, h
 
     def _secant_step(self, switch: Parameter) -> float:
-        """How far a switch that is off is moved: by its size; a time by one row, if that is less.
-
-        A time moves an edge. Up to one row it changes the readings beside the edge, about in
-        proportion. A longer one changes more rows, so that its secant tells little of a short one.
-        """
+        """Step of a switch that is off: its size; a time by one row, which moves an edge."""
         if switch.unit != "s":
             return switch.size
         least = max(switch.lower - switch.off, 0.0)  # of a time constant, which is never zero

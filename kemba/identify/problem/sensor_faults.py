@@ -23,8 +23,7 @@ def possible_faults(channel: str) -> dict[str, SensorEffect]:
 
 
 def _carriers() -> dict[str, type[Effect]]:
-    """Every other kind of effect that makes sensors show something wrong, such as a boom whose
-    encoders count with another lever."""
+    """Other kinds of effects that make sensors wrong, such as a boom's lever."""
     own = (Effect.readings, SensorEffect.readings)
     return {k: e for k, e in BY_KIND.items() if e.readings not in own}
 

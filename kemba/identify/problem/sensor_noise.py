@@ -101,12 +101,7 @@ def chosen_noise(
 
 
 def _sound(white: float, lags: Sequence[tuple[float, float]], most: float) -> ChannelNoise:
-    """A channel's noise within what is believed; without lags it is as stated.
-
-    `lags`: the fastest first. Each is compared with the noise that changes as fast or faster: a
-    drift may be large, and colour beside it is what differs from row to row. Where the whole is
-    more than `most`, the slowest lag gives way, if it is not the only one.
-    """
+    """A channel's noise, lags the fastest first, within what is believed (`most`)."""
     settings = ColourSettings
     whole = ChannelNoise(white, tuple(lags)).spread
     if len(lags) > 1 and whole > most:

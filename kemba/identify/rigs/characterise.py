@@ -82,10 +82,7 @@ class RigFit:
 
 
 def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
-    """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
-    without a value start at their usual size; a shape that these logs cannot tell stays as it is.
-    Raises KembaError where logs cannot tell figures apart.
-    """
+    """Fit all figures that the model lists and that show. Raises KembaError."""
     started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
     names = [
         name
@@ -167,8 +164,7 @@ def _fit(
 def _bounds(
     model: Model, names: list[str], values: Mapping[str, float], starts: int
 ) -> tuple[Array, Array]:
-    """Smallest and largest change (k,) of the factors of figures such that a model can have them;
-    of what follows, how logs start, there is none."""
+    """Smallest and largest change (k,) of factors such that a model can have the figures."""
     ends = []
     for name in names:
         declared = model.parameters[name][0] if name in model.parameters else None

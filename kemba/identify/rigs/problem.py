@@ -56,8 +56,7 @@ def stands(model: Model, kind: str) -> bool:
 
 
 def _sensor_sigmas(model: Model, logs: Sequence[RigLog]) -> dict[str, float]:
-    """Median noise of the channels whose sensors may be wrong. A drive's force is none of them: a
-    scale, an offset or a lag of the motor say the same."""
+    """Median noise of channels that may be wrong; a drive's force says what its motor does."""
     rig, found = model.mechanism.rig, {}
     for name in model.mechanism.logged:
         if name == ANSWER[rig] == "axis/tau":
@@ -171,8 +170,7 @@ def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]
 
 
 def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[float, float]:
-    """Travel and phase of the sine of the position that explains most of the force which inertia,
-    friction and an offset leave."""
+    """Travel and phase of the sine that explains most beside inertia, friction, offset."""
     none: Theta = {}
     force = np.concatenate([-predictor.gap(log, none) for log in logs])
     q, v, a = (

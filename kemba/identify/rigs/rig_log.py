@@ -232,8 +232,7 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
 
 
 def _stretch(log: Filtered, travel: float) -> Array:
-    """Stretch (n,) of contacts that slide after some travel; 0 at the begin of every stretch of the
-    log, for what was before is not known."""
+    """Stretch (n,) of contacts that slide after some travel; 0 at every begin."""
     z, found = 0.0, np.zeros(len(log.q))
     begins = set(log.begins.tolist())
     way = np.append(0.0, np.diff(log.q))

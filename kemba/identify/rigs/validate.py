@@ -35,8 +35,7 @@ def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[Ke
         return float(np.linalg.norm(force / sigma))
 
     def left(trial: RigLog) -> float:
-        """The share of the force that friction and damping of any size leave, which every rig may
-        have, and of a drive a zero of its force."""
+        """Share of the force left by any friction and damping, and a drive's zero."""
         known = [side * np.tanh(trial.speed / still), side * trial.speed]
         if not model.mechanism.bore:
             known += [np.ones(len(sigma)), -np.ones(len(sigma))]

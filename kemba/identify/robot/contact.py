@@ -181,11 +181,7 @@ def ground_level(z: Array, rate: Array) -> float:
 
 
 def _wandering_level(z: Array, level: float, dt: float) -> Array:
-    """Height (n,) [m] of the lowest readings around each row, where that may still be the ground.
-
-    Sensors that drift lift a standing foot by a centimetre, and more than that from its usual
-    `level` [m].
-    """
+    """Height (n,) [m] of the lowest readings around each row, near the usual `level`."""
     width = max(3, round(LEVEL_TIME / dt))
     calm = uniform_filter1d(z, max(3, round(RATE_WINDOW / dt)), mode="nearest")
     low = maximum_filter1d(minimum_filter1d(calm, width), width)
@@ -193,9 +189,7 @@ def _wandering_level(z: Array, level: float, dt: float) -> Array:
 
 
 def _stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings [m] at the two stops: the extreme ones of x (n,) [m] of a slow piston, if they are
-    near the ends of the stroke. What is read of a fast one may lie behind its stop: smoothed, or
-    late and shifted, it overshoots."""
+    """Readings [m] at both stops: extremes of x (n,) of a slow piston, near the ends."""
     ordered = np.sort(x)
     few = min(STOP_ROWS, len(x) - 1)
     if few < 0:

@@ -323,10 +323,7 @@ def robot_missing(
 
 
 def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
-    """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
-
-    `density` (n, L, c): of the other unknown forces.
-    """
+    """The filter's system with a lagged force per channel, `sigma` (k,), as more states."""
     base = state.motion.system_with(density, state.batch.h)
     keep = np.where(state.batch.valid, np.exp(-state.batch.h / MEMORY), 1.0)
     found, d = base.with_lags(keep[..., None], sigma), base.F.shape[-1]

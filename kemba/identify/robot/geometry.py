@@ -174,8 +174,7 @@ def remarks(found: StandingLengths) -> list[str]:
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
-    """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
-    be, and with the zero of the height, of the pitch, of the hips or of the pistons in doubt."""
+    """Costs of fits with the model's lengths: zeros as exact as supposed, or one kind in doubt."""
     first, legs = len(standing.names), standing.legs
     hips = list(range(first + 2, first + 2 + legs))
     doubts: Sequence[list[int]] = ([], [first + 1], [first], hips, [i + legs for i in hips])
@@ -212,8 +211,7 @@ def _crowd(heights: Array) -> Array:
 def _refined(
     standing: Standing, x: Array, width: Array, rows: Flags | None = None
 ) -> tuple[Array, float, Flags]:
-    """The best x (k,) with prior widths (k,), half the sum of squares, and the samples (n, legs)
-    that stand; `rows`: which samples are known to."""
+    """The best x (k,) with prior widths (k,), its cost, and which samples stand (n, legs)."""
     weight = 1.0 / (NOISE * np.sqrt(TOGETHER))
     cost = 0.0
     for band in BANDS:

@@ -163,12 +163,7 @@ def _filter_system(
     slopes: tuple[Array, Array],
     unknown: Array,
 ) -> System:
-    """States: deviations of q and v (n, L, 2 k), then the places where feet and stops stand.
-
-    `measured`: slopes of channels (n, L, m, k) and feet (n, L, 2 legs, k) along q. `slopes`: of the
-    acceleration along q and v (n, L, k, k). `unknown` (n, L, k, k): covariance of the acceleration
-    that unknown forces make.
-    """
+    """States: deviations of q, v (n, L, 2 k), then places where feet and stops stand."""
     (Jy, Jf), (A_q, A_v) = measured, slopes
     k, legs = Jy.shape[-1], Jf.shape[2] // 2
     places = 3 * legs  # x and z of each foot, and the stop on which each piston rests
@@ -220,12 +215,7 @@ def scatter(pushed: Array, density: Array, h: Array) -> Array:
 def _rigid_forces(
     channels: Array, density: Array, force: Array, k: int, legs: int
 ) -> tuple[Array, Flags]:
-    """Forces (n, L, 3 legs) [N] of the stops and then of the feet, and where these act.
-
-    `force` (n, L, k) is what the motion needs beyond the model. It is split among the `channels`
-    (n, L, k, c) with the smallest norm, each channel weighted by the `density` (n, L, c) of its
-    unknown force.
-    """
+    """Forces (n, L, 3 legs) [N] of stops, then feet, of least norm, and where they act."""
     settings = ContactForceSettings
     weighted = channels * density[..., None, :]
     S = weighted @ channels.swapaxes(-1, -2)

@@ -146,8 +146,7 @@ def learnt_noise(
 def _channel_noise(
     memories: Sequence[float], channel: int, sigma: Array, h: Array, m: int
 ) -> Array:
-    """Noise (n, L, m, memories x draws) of one channel, of one stated sigma; `memories` [s]: 0 is
-    white."""
+    """Noise (n, L, m, memories x draws) of one channel, unit sigma; memory 0 is white."""
     draws = lag_noise(memories, h, ColourSettings.draws, np.random.default_rng(17 + channel))
     y = np.zeros((*h.shape, m, len(memories) * ColourSettings.draws))
     y[:, :, channel] = sigma[:, channel, None] * draws.reshape(*h.shape, -1)

@@ -216,8 +216,7 @@ class RobotProblem(Problem):
         return np.stack([columns[n] for n in names], axis=-1)
 
     def _is_direct(self, name: str) -> bool:
-        """Whether the force is linear in it, and nothing else depends on it: shapes, states,
-        delays, lengths and what sensors show are not so."""
+        """Whether the force is linear in it, and nothing else depends on it."""
         physics = self.physics
         if moves_readings(name) or name in physics.moving or name in physics.base.delays:
             return False
@@ -283,8 +282,7 @@ class RobotProblem(Problem):
         return [f"no foot stands: {zeros}"] if all_fly else remarks(self.standing)
 
     def _faults(self) -> list[KembaError]:
-        """What is wrong with the logs, the simplest first: columns by the feet alone, commands by
-        what the model leaves, then what no model explains."""
+        """What is wrong with the logs: columns by feet, then commands, then any model."""
         if self.mixed:
             return self.mixed
         r, rows = self.residual(self.lengths), self.rows()
