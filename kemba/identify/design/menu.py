@@ -38,7 +38,7 @@ def splitting_test(model: str, problem: Problem, effects: Sequence[str]) -> Spli
     menu: list[tuple[str, float, Separation]] = []
     if not piston.mechanism.rig:  # of one's own rigs none is known
         judged = judged_menu(VirtualBench(piston, ExperimentSettings.coarse), rivals)
-        menu = [(f"the rig test '{one.rig.name}'", one.log_s, one.evidence) for one in judged]
+        menu = [(f"the rig test '{one.test.name}'", one.log_s, one.evidence) for one in judged]
     if len(robot.mechanism.legs) > 1 and (sway := try_out(robot, STANDARD, rivals)):
         menu.append(("a slow sway of the robot", sway.log_s, sway.evidence))
     found = (

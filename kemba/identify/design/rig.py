@@ -25,15 +25,18 @@ from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
+    Judged,
+    Proposal,
     Rivals,
     Separation,
+    best_fit,
     contenders,
-    evidence,
+    misfit,
     separation,
     strength,
 )
 from kemba.identify.problem.noise import Colour, learn
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.types import Array
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.rigs import CourseRig, DynamometerRig, LockedRig, RandomRig, Rig, Test
@@ -77,15 +80,6 @@ def _with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
     return found
 
 
-def as_predicted(problem: BenchProblem, theta: Theta) -> BenchProblem:
-    """The problem of logs in which everything is as the model at theta has it."""
-    logs = []
-    for i, log in enumerate(problem.logs):
-        readings = problem.readings(theta, i)
-        logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
-    return _with_logs(problem, logs)
-
-
 def log_time(rig: Rig, stroke: float) -> float:
     """Seconds of log of the tests that are judged."""
     tests: Iterable[Test] = rig.tests(np.random.default_rng(0), stroke)
@@ -119,20 +113,6 @@ def _colour(rows: float) -> Colour:
     return learn(rng.standard_normal(settings.sample) + share * slow)
 
 
-@dataclass(frozen=True)
-class JudgedRig:
-    """A rig, the evidence that its tests are expected to give, and the seconds of its logs."""
-
-    rig: Rig
-    evidence: Separation
-    log_s: float
-
-    @property
-    def pace(self) -> float:
-        """Expected evidence [nats] per second of log."""
-        return self.evidence.least / self.log_s
-
-
 def _menu(stroke: float) -> list[Rig]:
     """Standard tests of one piston of this stroke [m]."""
     modes = ("extend", "retract", "both", "none")
@@ -153,13 +133,13 @@ def _menu(stroke: float) -> list[Rig]:
     ]
 
 
-def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedRig]:
+def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[Judged]:
     """Every standard test; none where a rig cannot show two of the rivals."""
     for rig in _menu(bench.stroke):
         found = separation(bench.problem(rig), rivals)
         if found is None:
             return
-        yield JudgedRig(rig, found, log_time(rig, bench.stroke))
+        yield Judged(rig, found, log_time(rig, bench.stroke))
 
 
 class RigCourseSettings:
@@ -284,70 +264,43 @@ def _best_point(
 
 
 @dataclass(frozen=True)
-class RigDesign:
-    """The best standard test and the designed one; `chosen` is the one to be done."""
-
-    standard: JudgedRig
-    designed: JudgedRig
-    tried: int
+class RigDesign(Proposal):
+    """A proposal of rigs; `chosen` is the one to be done."""
 
     @property
-    def chosen(self) -> JudgedRig:
+    def chosen(self) -> Judged:
         """The designed test, except where only the standard one settles the question."""
         clear = ExperimentSettings.clear
         least, other = self.designed.evidence.least, self.standard.evidence.least
         return self.standard if least < min(clear, other) else self.designed
 
     @property
-    def rig(self) -> Rig:
-        """What the test does."""
-        return self.chosen.rig
-
-    @property
-    def nats(self) -> float:
-        """Expected evidence [nats] between the two effects that are hardest to separate."""
-        return self.chosen.evidence.least
-
-    @property
-    def rivals(self) -> tuple[str, str]:
-        """These two effects."""
-        return self.chosen.evidence.first, self.chosen.evidence.nearest
-
-    @property
     def sentence(self) -> str:
         """What the test gains, in words."""
-        first, second = self.rivals
-        chosen, standard = self.chosen, self.standard
+        chosen, standard, (first, second) = self.chosen, self.standard, self.pair
         word, length = strength(self.nats), f"{chosen.log_s:.2g} s of log"
         if self.nats < ExperimentSettings.clear:
             return (
                 f"No test of a rig that was tried separates {first} from {second}: the best, "
-                f"'{chosen.rig.name}' ({length}), is expected to give {word} evidence."
+                f"'{chosen.test.name}' ({length}), is expected to give {word} evidence."
             )
         text = (
-            f"The test '{chosen.rig.name}' ({length}) separates {first} from {second}: {word} "
+            f"The test '{chosen.test.name}' ({length}) separates {first} from {second}: {word} "
             "evidence is expected"
         )
         if chosen is standard:
             return f"{text}; no shorter test that was tried gives as much."
-        other = f"the best standard test, '{standard.rig.name}' ({standard.log_s:.2g} s)"
+        other = f"the best standard test, '{standard.test.name}' ({standard.log_s:.2g} s)"
         if standard.evidence.least < 1.0:
             return f"{text}; {other}, gives almost none."
         return f"{text}, {chosen.pace / standard.pace:.2g} times as much per second as {other}."
 
     def json(self) -> dict[str, Any]:
-        """The figures behind the sentence; `designed` and `standard` have the same keys."""
-        return {
-            "rig": self.rig.name,
-            "nats": self.nats,
-            "rivals": self.rivals,
-            "sentence": self.sentence,
-            "strength": strength(self.nats),
-            "log_s": self.chosen.log_s,
-            "designed": _figures(self.designed),
-            "standard": _figures(self.standard),
-            "tried": self.tried,
-        }
+        """The same with the names of the rigs."""
+        found = {"rig": self.chosen.test.name, **super().json()}
+        for side, judged in (("designed", self.designed), ("standard", self.standard)):
+            found[side] = {"rig": judged.test.name, **found[side]}
+        return found
 
 
 def design_rig_test(
@@ -380,20 +333,24 @@ def design_rig_test(
     point, tried = _best_point(worth, beginnings(search.members, search.seed), say, bounded)
     rig = course(point, duration, bench.stroke)
     say("fitting the rivals to what the tests would measure")
-    before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
+    before, after = (_confirmed(bench, r, rivals) for r in (standard.test, rig))
     return RigDesign(before, after, tried)
 
 
-def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
+def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> Judged:
     """A test, its evidence between the nearest rivals by a fit in place of slopes."""
     problem = bench.problem(rig)
     straight = separation(problem, rivals)
     assert straight is not None
     first, nearest = straight.first, straight.nearest
-    logs = as_predicted(problem, rivals.theta(first))
-    fitted = evidence(logs, rivals, nearest)
+    logs = []  # in which everything is as the first rival has it
+    for i, log in enumerate(problem.logs):
+        readings = problem.readings(rivals.theta(first), i)
+        logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
+    exact = _with_logs(problem, logs)
+    fitted = misfit(exact, best_fit(exact, rivals, nearest))
     nats = {**straight.nats, nearest: min(fitted, straight.least)}
-    return JudgedRig(rig, Separation(first, nats), log_time(rig, bench.stroke))
+    return Judged(rig, Separation(first, nats), log_time(rig, bench.stroke))
 
 
 def propose(
@@ -418,11 +375,7 @@ def propose(
     if found is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no rig test shows a difference between {names}")
-    rig = {"kind": found.rig.kind, **found.rig.model_dump(mode="json", exclude_defaults=True)}  # type: ignore[attr-defined]
+    chosen = found.chosen.test
+    rig = {"kind": chosen.kind, **chosen.model_dump(mode="json", exclude_defaults=True)}
     dump_yaml({"rig": {**rig, "notes": found.sentence}}, out)
     return found
-
-
-def _figures(judged: JudgedRig) -> dict[str, Any]:
-    """Name of a test, and what it is expected to give."""
-    return {"rig": judged.rig.name, **judged.evidence.json(judged.log_s)}

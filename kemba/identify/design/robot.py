@@ -22,6 +22,8 @@ from kemba.identify.answer import read_answer
 from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
+    Judged,
+    Proposal,
     Rivals,
     Separation,
     contenders,
@@ -145,22 +147,11 @@ STANDARD = Sway(angle=0.1, leans=2, duration=0.9, pace=1.0)
 
 
 @dataclass(frozen=True)
-class Tried:
-    """A sway as it was simulated, with its expected evidence and the seconds of its log."""
+class Tried(Judged):
+    """A sway as it was simulated."""
 
-    sway: Sway
+    test: Sway
     done: Trajectory
-    evidence: Separation
-
-    @property
-    def log_s(self) -> float:
-        """Seconds of log, the rest before it included."""
-        return float(self.done.time[-1] - self.done.time[0])
-
-    @property
-    def pace(self) -> float:
-        """Expected evidence [nats] per second of log."""
-        return self.evidence.least / self.log_s
 
 
 def _design_motion(
@@ -204,7 +195,8 @@ def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
         return None
     if not safe(model, done):
         return None
-    return Tried(sway, done, expected(model, done, rivals))
+    log_s = float(done.time[-1] - done.time[0])  # the rest before it included
+    return Tried(sway, expected(model, done, rivals), log_s, done)
 
 
 def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
@@ -243,7 +235,7 @@ def _sways(count: int, seed: int, height: float, best: Callable[[], list[Tried]]
         yield _sway(point, height)
     for _ in range(count - even - 1):
         found = best()
-        near = _point(found[0].sway) if found else np.full(4, 0.5)
+        near = _point(found[0].test) if found else np.full(4, 0.5)
         yield _sway(np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0), height)
 
 
@@ -276,30 +268,13 @@ def _point(sway: Sway) -> Array:
 
 
 @dataclass(frozen=True)
-class MotionProposal:
-    """The standard sway, and safe `motions`, the best one first; `tried` of them were simulated."""
+class MotionProposal(Proposal):
+    """A proposal of sways: safe `motions`, the best one first."""
 
+    motions: Sequence[Tried]
     model: Model
     base: str
     rivals: Rivals
-    standard: Tried
-    motions: Sequence[Tried]
-    tried: int
-
-    @property
-    def best(self) -> Tried:
-        """The motion with the most expected evidence."""
-        return self.motions[0]
-
-    @property
-    def nats(self) -> float:
-        """Expected evidence [nats] of one run of it, between the effects hardest to separate."""
-        return self.best.evidence.least
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """These two effects."""
-        return self.best.evidence.first, self.best.evidence.nearest
 
     @property
     def repeats(self) -> int | None:
@@ -311,8 +286,8 @@ class MotionProposal:
     def sentence(self) -> str:
         """What the motion gains, in words."""
         first, second = self.pair
-        best, standard = self.best, self.standard
-        what = f"A sway of {best.sway.duration:.2g} s with {best.sway.leans} leans"
+        best, standard = self.designed, self.standard
+        what = f"A sway of {best.test.duration:.2g} s with {best.test.leans} leans"
         gives = f"{strength(self.nats)} evidence between {first} and {second}"
         if self.repeats is None:
             return (
@@ -328,24 +303,13 @@ class MotionProposal:
         return f"{text}, {ratio:.2g} times as much per second as a slow lean to both sides."
 
     def json(self) -> dict[str, Any]:
-        """The figures behind the sentence; `designed` and `standard` have the same keys."""
-        return {
-            "motion": "sway",
-            "nats": self.nats,
-            "rivals": self.pair,
-            "sentence": self.sentence,
-            "strength": strength(self.nats),
-            "log_s": self.best.log_s,
-            "repeats": self.repeats,
-            "designed": self.best.evidence.json(self.best.log_s),
-            "standard": self.standard.evidence.json(self.standard.log_s),
-            "tried": self.tried,
-        }
+        """The same with the runs that it takes."""
+        return {"motion": "sway", "repeats": self.repeats, **super().json()}
 
     def write(self, out: Path, tried: Tried) -> None:
         """One of the motions as a task YAML. Raises KembaError."""
-        notes = self.sentence if tried is self.best else "the next best motion"
-        dump_yaml(task(self.model, self.base, tried.sway, tried.done, notes), out)
+        notes = self.sentence if tried is self.designed else "the next best motion"
+        dump_yaml(task(self.model, self.base, tried.test, tried.done, notes), out)
 
     def nats_of(self, run: str | Path) -> float:
         """Expected evidence [nats] of the plan in a run folder."""
@@ -373,6 +337,7 @@ def propose_motion(
     if design is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no log of the robot shows a difference between {names}")
-    found = MotionProposal(model, base, rivals, *design)
-    found.write(out, found.best)
+    standard, motions, tried = design
+    found = MotionProposal(standard, motions[0], tried, motions, model, base, rivals)
+    found.write(out, motions[0])
     return found

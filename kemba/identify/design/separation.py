@@ -130,6 +130,62 @@ class Separation:
         }
 
 
+@dataclass(frozen=True)
+class Judged:
+    """A test, the evidence that its log is expected to hold, and the seconds of that log."""
+
+    test: Any
+    evidence: Separation
+    log_s: float
+
+    @property
+    def pace(self) -> float:
+        """Expected evidence [nats] per second of log."""
+        return self.evidence.least / self.log_s
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """The best standard test and the designed one; `tried`: how many were looked at."""
+
+    standard: Judged
+    designed: Judged
+    tried: int
+
+    @property
+    def chosen(self) -> Judged:
+        """The test that is to be done."""
+        return self.designed
+
+    @property
+    def nats(self) -> float:
+        """Expected evidence [nats] of it between the two effects that are hardest to separate."""
+        return self.chosen.evidence.least
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """These two effects."""
+        return self.chosen.evidence.first, self.chosen.evidence.nearest
+
+    @property
+    def sentence(self) -> str:
+        """What the test gains, in words."""
+        raise NotImplementedError
+
+    def json(self) -> dict[str, Any]:
+        """The figures behind the sentence; `designed` and `standard` have the same keys."""
+        return {
+            "nats": self.nats,
+            "rivals": self.pair,
+            "sentence": self.sentence,
+            "strength": strength(self.nats),
+            "log_s": self.chosen.log_s,
+            "designed": self.designed.evidence.json(self.designed.log_s),
+            "standard": self.standard.evidence.json(self.standard.log_s),
+            "tried": self.tried,
+        }
+
+
 def separation(problem: Problem, rivals: Rivals) -> Separation | None:
     """The evidence between the rivals that logs of this problem's motion would hold.
 
@@ -141,17 +197,14 @@ def separation(problem: Problem, rivals: Rivals) -> Separation | None:
     first, *others = names
     figures = _columns(problem, rivals.theta(first), tuple(problem.nuisance))
     at = {name: problem.residual(rivals.theta(name)) for name in names}
-    free = {name: _columns(problem, rivals.theta(name), _own(problem, name)) for name in names}
+    own = {name: tuple(problem.candidates[name].keys()) for name in names}
+    free = {name: _columns(problem, rivals.theta(name), own[name]) for name in names}
 
     def against(fitted: str, truth: str) -> float:
         """Evidence [nats] against one rival if the other is there."""
         return _left(at[fitted] - at[truth], figures, free[fitted])
 
     return Separation(first, {o: min(against(o, first), against(first, o)) for o in others})
-
-
-def _own(problem: Problem, effect: str) -> tuple[str, ...]:
-    return tuple(problem.candidates[effect].keys())
 
 
 def _left(gap: Array, figures: Array, free: Array) -> float:
@@ -165,18 +218,8 @@ def _left(gap: Array, figures: Array, free: Array) -> float:
 
 def _columns(problem: Problem, theta: Theta, names: tuple[str, ...]) -> Array:
     """Slopes (n, k) of the residual along these parameters, per prior width."""
-    return np.asarray(problem.jacobian(theta, names) * _widths(problem, theta, names))
-
-
-def _widths(problem: Problem, theta: Theta, names: tuple[str, ...]) -> Array:
-    """Prior widths (k,) of parameters, in their units; those of shapes at their values."""
-    _, _, width = priors(problem, theta, names)
-    return np.array(
-        [
-            w * theta[name] if is_shape(problem, name) else w
-            for name, w in zip(names, width, strict=True)
-        ]
-    )
+    value = [theta[name] if is_shape(problem, name) else 1.0 for name in names]
+    return np.asarray(problem.jacobian(theta, names) * priors(problem, theta, names)[2] * value)
 
 
 def best_fit(problem: Problem, rivals: Rivals, name: str) -> dict[str, float]:
@@ -185,12 +228,6 @@ def best_fit(problem: Problem, rivals: Rivals, name: str) -> dict[str, float]:
     shared = (key.rsplit(".", 1)[0] for key in rivals.shared)
     frozen = Frozen(names, problem.jacobian(theta, names))
     return refit(problem, tuple(sorted({name, *shared})), theta, frozen).theta
-
-
-def evidence(problem: Problem, rivals: Rivals, rival: str) -> float:
-    """How much worse [nats] the best fit of a rival explains logs without noise than what made
-    them, which explains them entirely."""
-    return misfit(problem, best_fit(problem, rivals, rival))
 
 
 def misfit(problem: Problem, theta: Theta) -> float:
