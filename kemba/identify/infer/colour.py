@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kemba.identify.infer.linear import Linear, is_on, linearise, time_blocks
+from kemba.identify.infer.linear import is_on, linearise, time_blocks
 from kemba.identify.infer.mode import mode_of
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import moves_readings
@@ -42,12 +42,9 @@ def _with_drift(problem: Problem, theta: Theta) -> Problem:
 def log_likelihood(problem: Problem, theta: Theta) -> float:
     """Log likelihood [nats] of the logs, up to a constant, all effects free within their priors."""
     linear, _, _ = linearise(problem, theta, time_blocks(problem))
-    gram, slope, power = linear.total
-    best = best_fit(linear)
-    step, off = best - linear.at, (best - linear.mean) / linear.width
-    h = gram * np.outer(linear.width, linear.width) + np.eye(len(off))
-    squares = power + 2.0 * slope @ step + step @ gram @ step + off @ off
-    return problem.log_density() - 0.5 * float(squares + np.linalg.slogdet(h)[1])
+    h = linear.total[0] * np.outer(linear.width, linear.width) + np.eye(len(linear.width))
+    spread = 0.5 * float(np.linalg.slogdet(h)[1])
+    return problem.log_density() - linear.cost(linear.best()) - spread
 
 
 def learnt_colour(
@@ -59,15 +56,5 @@ def learnt_colour(
     linear, jacobian, _ = linearise(plain, theta, blocks)
     on = tuple(n for n, c in plain.candidates.items() if is_on(theta, c.key, c.lead))
     mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
-    left = mode.residual + jacobian @ (best_fit(mode.linear) - mode.linear.at)
+    left = mode.residual + jacobian @ (mode.linear.best() - mode.linear.at)
     return plain.recolour(left, careful=careful), jacobian
-
-
-def best_fit(linear: Linear) -> Array:
-    """z (k,) of the best fit, every parameter free within its prior."""
-    gram, slope, _ = linear.total
-    precision = 1.0 / linear.width**2
-    shift = linear.mean - linear.at
-    h = (gram + np.diag(precision)) * np.outer(linear.width, linear.width)
-    eta = linear.width * (precision * shift - slope)
-    return linear.at + linear.width * np.linalg.solve(h, eta)

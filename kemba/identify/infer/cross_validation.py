@@ -126,7 +126,7 @@ def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: boo
     linear, parts, found = point.linear, folds(search, fine), []
     for part in np.unique(parts):
         mask = parts == part
-        fit = within_tolerance(search, linear.without(mask), point.hypothesis)
+        fit = within_tolerance(search, linear.only(~mask), point.hypothesis)
         step = begun(linear, fit) - linear.at
         gram, slope, power = judged.only(mask).total
         found.append(power + 2 * slope @ step + step @ gram @ step)

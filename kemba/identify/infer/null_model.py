@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.colour import best_fit, learnt_colour, with_learnt_colour
+from kemba.identify.infer.colour import learnt_colour, with_learnt_colour
 from kemba.identify.infer.linear import (
     Linear,
     LinearSettings,
@@ -171,7 +171,7 @@ class Baseline:
         for _ in range(ROUNDS):
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
-            theta = estimate(problem, linear, best_fit(linear))
+            theta = estimate(problem, linear, linear.best())
         self._rank(theta, known if moving else self._learn_noise(theta, keep=True))
 
     def _rank(self, theta: Mapping[str, float], jacobian: Array | None = None) -> None:

@@ -8,7 +8,6 @@ from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.answer import DiscoverSettings
-from kemba.identify.infer.colour import best_fit
 from kemba.identify.infer.linear import Linear, precision_factor, time_blocks
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Ranker, SpikeSlabSettings
@@ -209,7 +208,7 @@ def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
     leaves of the null's residual: noise for the bootstrap."""
     problem, settings = search.problem, LeftOutNoiseSettings
-    left = search.points[NULL].mode.residual + jacobian @ (best_fit(linear) - linear.at)
+    left = search.points[NULL].mode.residual + jacobian @ (linear.best() - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
     power = settings.power_in_motion if problem.moves else settings.power
     return left_out_noise(jacobian, left, linear.width, blocks, power)

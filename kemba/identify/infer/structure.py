@@ -14,7 +14,6 @@ import numpy as np
 from scipy.special import expit
 
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, VerdictSettings, phrase
-from kemba.identify.infer.colour import best_fit
 from kemba.identify.infer.cross_validation import left_out
 from kemba.identify.infer.joint import JointFit
 from kemba.identify.infer.linear import linearise, names_of, time_blocks
@@ -74,10 +73,8 @@ def _unexplained(problem: Problem, theta: Mapping[str, float]) -> float:
     """Nats per row left when every effect within this structure may help, by a linear step."""
     other = {problem.candidates[name].key for name in problem.structures}
     names = [name for name in names_of(problem, theta) if name not in other]
-    linear, jacobian, r = linearise(problem, theta, time_blocks(problem), names)
-    z = best_fit(linear)
-    left, far = r + jacobian @ (z - linear.at), (z - linear.mean) / linear.width
-    return 0.5 * float(left @ left + far @ far) / len(r)
+    linear, _, r = linearise(problem, theta, time_blocks(problem), names)
+    return linear.cost(linear.best()) / len(r)
 
 
 def structure_row(
