@@ -12,7 +12,7 @@ from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import null_test
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.types import Parameter
-from kemba.identify.workflow import admitted, check_all, model_of
+from kemba.identify.workflow import posed
 from kemba.logs import load_map
 from kemba.stopwatch import Tell, silent
 
@@ -51,10 +51,7 @@ def preview(
     """
     tell("reading the logs")
     read = read_logs(logs, load_map(column_map) if column_map else None)
-    built = model_of(read, model)
-    check_all(read, built)
-    tell("finding the motion in the logs")
-    problem, _ = admitted(read, built)
+    problem, _ = posed(read, model, tell)
     search = Search(problem, say=tell)
     search.prepare()
     told = what_shows(search, null_test(search))

@@ -242,6 +242,16 @@ def admitted(logs: Sequence[Trajectory], model: Model) -> tuple[Problem, list[st
     return problem, [*cut, *problem.validate()]
 
 
+def posed(logs: Sequence[Trajectory], model: str, tell: Tell = silent) -> tuple[Problem, list[str]]:
+    """The problem that logs pose to a model, and remarks. Raises KembaError; BadData where the logs
+    cannot be right."""
+    built = model_of(logs, model)
+    remarks = [*built.remarks, *check_all(logs, built)]
+    tell("finding the motion in the logs")
+    problem, more = admitted(logs, built)
+    return problem, [*remarks, *more]
+
+
 def check_log(
     path: str | Path, model: str = "planning", column_map: str | Path | None = None
 ) -> tuple[Trajectory, list[str]]:
@@ -251,9 +261,7 @@ def check_log(
     Raises KembaError where the file cannot be read; BadData where the log cannot be right.
     """
     logs = read_logs([path], load_map(column_map) if column_map else None)
-    built = model_of(logs, model)
-    remarks = [*built.remarks, *check_all(logs, built)]
-    return logs[0], [*remarks, *admitted(logs, built)[1]]
+    return logs[0], posed(logs, model)[1]
 
 
 def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
@@ -289,10 +297,8 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
 
 def _check_disjoint(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
     """A held-out log must not be fitted as well."""
-    both = {Path(t.meta["path"]).resolve() for t in fitted} & {
-        Path(t.meta["path"]).resolve() for t in kept
-    }
-    if both:
+    paths = ({Path(log.meta["path"]).resolve() for log in logs} for logs in (fitted, kept))
+    if both := set.intersection(*paths):
         raise KembaError("--holdout", f"{sorted(both)[0].name} is also among the logs to be fitted")
 
 
@@ -309,9 +315,8 @@ def compare_logs(
     """Where `model` fails on these logs, and how far a planned `run` (a folder or a trajectory
     CSV) was missed. `tell` gets the name of every stage. Raises KembaError; BadData where the logs
     cannot be right."""
-    columns = load_map(column_map) if column_map else None
     tell("reading the logs")
-    read = read_logs(logs, columns)
+    read = read_logs(logs, load_map(column_map) if column_map else None)
     found, problem = compare_read(read, model, tell)
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
@@ -323,10 +328,7 @@ def compare_read(
     read: Sequence[Trajectory], model: str, tell: Tell = silent
 ) -> tuple[Comparison, Problem]:
     """Where `model` fails on logs that were read. Raises as `compare_logs` does."""
-    built = model_of(read, model)
-    check_all(read, built)
-    tell("finding the motion in the logs")
-    problem, _ = admitted(read, built)
+    problem, _ = posed(read, model, tell)
     tell("learning the noise of the sensors")
     problem = _with_noise(problem)
     tell("comparing with the model")

@@ -149,7 +149,7 @@ class JointFit:
         """The parameters of one effect, as the catalogue has them."""
         found = {}
         for parameter in candidate.parameters:
-            name, unit = candidate.reciprocal.get(parameter.name, (parameter.name, parameter.unit))
+            name, unit = candidate.reported(parameter)
             i = self.names.index(f"{candidate.effect}.{name}")
             value, low, high = (float(x[i]) for x in (self.value, self.low, self.high))
             found[name] = Value(value, low, high, unit)

@@ -13,7 +13,6 @@ from kemba.identify.infer.null_model import within_bounds
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, strength
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, SpikeSlabSettings, share_of
-from kemba.identify.problem.types import Array, Candidate, Parameter
 
 # two explanations are equivalent when their evidence differs by less [nats]: Kass and Raftery
 # 1995, 'strong' evidence begins at 3 nats
@@ -106,33 +105,19 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
     point, found = search.points[hypothesis], {}
     z, covariance = within_bounds(problem, point), point.score.covariance
     for key, parameter in candidate.keys().items():
-        i = point.linear.index(key)
-        ends = _interval(z[i], covariance[i, i], None if is_shape(problem, key) else parameter)
-        triple = np.array([z[i], *ends])
-        if is_shape(problem, key):
+        i, shape = point.linear.index(key), is_shape(problem, key)  # shapes by their logarithm
+        step = 1.0 if shape else abs(z[i] - parameter.off)
+        reach = 1.96 * float(np.hypot(np.sqrt(covariance[i, i]), SpikeSlabSettings.spike * step))
+        triple = z[i] + reach * np.array([0.0, -1.0, 1.0])
+        if shape:
             triple = np.exp(np.clip(triple, -50, 50))
         triple = np.clip(triple, parameter.lower, parameter.upper)
-        name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
-        value, low, high = (float(t) for t in triple)
+        name, unit = candidate.reported(parameter)
+        if name != parameter.name:
+            triple = 1.0 / np.maximum(triple, 1e-12)[[0, 2, 1]]
+        value, low, high = triple.tolist()
         found[name] = Value(value, low, high, unit)
     return found
-
-
-def _interval(centre: float, variance: float, switch: Parameter | None) -> tuple[float, float]:
-    """95 % interval of an effect's `switch`, or of the logarithm of its shape (None)."""
-    step = 1.0 if switch is None else abs(centre - switch.off)
-    reach = 1.96 * float(np.hypot(np.sqrt(variance), SpikeSlabSettings.spike * step))
-    return centre - reach, centre + reach
-
-
-def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
-    """Name, unit and `triple` (3,) = value, low, high of a parameter as the catalogue has it, also
-    where the search was for its reciprocal value."""
-    if name not in candidate.reciprocal:
-        return name, unit, triple
-    name, unit = candidate.reciprocal[name]
-    value, low, high = 1.0 / np.maximum(triple, 1e-12)
-    return name, unit, np.array([value, high, low])
 
 
 def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:

@@ -14,7 +14,6 @@ from kemba.identify.compare.words import place_of
 from kemba.identify.infer.cross_validation import within_tolerance
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, SpikeSlabSettings
-from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import Array, Labels
 from kemba.units import short
 
@@ -51,13 +50,18 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
     if len(problem.runs) < 2:
         return None
     run = problem.rows().run
-    residual = problem.residual(point.fit.theta) if best else _tolerant(search)
+    residual = search.base.residual
+    if best:
+        residual = problem.residual(point.fit.theta)
+    else:  # nominal figures within their tolerance
+        z = within_tolerance(search, point.linear, NULL)
+        residual = residual + search.base.jacobian @ (z - point.linear.at)
     gained = point.log_evidence - search.points[()].log_evidence
     count = np.bincount(run)
     found: list[Drift] = []
     for effect, candidate in problem.candidates.items():
         column = search.base.jacobian[:, search.points[()].linear.index(candidate.key)]
-        gram, slope = _sums(column * column, run), _sums(column * residual, run)
+        gram, slope = (np.bincount(run, column * other) for other in (column, residual))
         error = (1.0 + FORGIVEN**2 * count) / np.maximum(gram, 1e-12)
         keep = error < (INFORMED * candidate.lead.size) ** 2
         if keep.sum() < 2:
@@ -70,23 +74,8 @@ def drifting(search: Search, best: Hypothesis) -> Drift | None:
         if np.ptp(own) > SPREAD * candidate.lead.size:
             values = tuple(float(candidate.lead.off + a) for a in own)
             found.append(Drift(effect, candidate.key, values, nats))
-    clearest = max(found, key=lambda d: d.nats, default=None)
     least = max(CLEAR, SHARE * gained, SHARE_OF_ROWS * len(residual))
-    if clearest is None or clearest.nats < least:
-        return None
-    return clearest
-
-
-def _tolerant(search: Search) -> Array:
-    """Residual of the model as it is, its nominal figures within their tolerance."""
-    linear = search.points[NULL].linear
-    z = within_tolerance(search, linear, NULL)
-    return search.base.residual + search.base.jacobian @ (z - linear.at)
-
-
-def _sums(values: Array, run: Labels) -> Array:
-    """Sum (runs,) of values (n,) over the rows of each run."""
-    return np.asarray(np.bincount(run, weights=values), dtype=float)
+    return max((d for d in found if d.nats >= least), key=lambda d: d.nats, default=None)
 
 
 # When error that repeats itself tells that something is missing.
@@ -105,7 +94,10 @@ def _structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     r = np.clip(left_over.residual, -CLIP, CLIP)
     columns = left_over.features
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
-    folds = _folds(left_over.run)
+    folds = np.zeros(len(r), dtype=int)  # blocks of time of each run, dealt out in turn
+    for run in np.unique(left_over.run):
+        own = np.flatnonzero(left_over.run == run)
+        folds[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
     power = float(np.mean(r**2))
     left = min(float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in RIDGES)
     return power, max(power - left, 0.0)
@@ -120,15 +112,6 @@ def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> A
         h = a.T @ a + ridge * len(a) * np.eye(a.shape[1])
         predicted[out] = columns[out] @ np.linalg.solve(h, a.T @ b)
     return predicted
-
-
-def _folds(run: Labels) -> Labels:
-    """Which fold each row (n,) belongs to: runs are cut into blocks of time, dealt out in turn."""
-    labels = np.zeros(len(run), dtype=int)
-    for i in np.unique(run):
-        own = np.flatnonzero(run == i)
-        labels[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
-    return labels
 
 
 def unfinished(search: Search, best: Hypothesis) -> bool:
@@ -193,17 +176,13 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> tuple[
     bins = sorted(conditions(problem, theta), key=lambda b: -b.ratio)
     worst = [f"{place_of(b)} ({short(b.ratio)} times the noise)" for b in bins if b.significant][:1]
     channel = profiles[0].channel if law else bins[0].channel if worst else ""
-    advice = _advice(problem, channel)
+    rest = "; ".join([*worst, *law]) or "no condition in particular"
     if unsure:
         named = " and ".join(unsure)
-        advice = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"
-    return "; ".join([*worst, *law]) or "no condition in particular", advice
-
-
-def _advice(problem: Problem, channel: str) -> str:
-    """What to measure to learn more about a channel, on the machine that the logs are of."""
+        told = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"
+        return rest, told
     if not problem.moves:
         model = getattr(problem, "model", None)
-        return STROKES if model is None else ON_RIGS.get(model.mechanism.rig, STROKES)
+        return rest, STROKES if model is None else ON_RIGS.get(model.mechanism.rig, STROKES)
     parts = channel.replace(" ", "/").split("/")
-    return next((text for key, text in NEXT.items() if key in parts), BODY)
+    return rest, next((text for key, text in NEXT.items() if key in parts), BODY)

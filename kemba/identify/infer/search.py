@@ -98,7 +98,10 @@ class Search:
         if self.problem.moves:
             return self._follow(best)
         if best != NULL:
-            promising = self._promising()
+            null = self.points[NULL].log_evidence
+            gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
+            least = SearchSettings.promising * max(gains.values())
+            promising = [h for h, gain in gains.items() if gain > least]
             self.base.seen_from(self.points[best].fit.theta)
             self.problem = self.base.problem
             self.points = {NULL: self.base.point}
@@ -112,17 +115,18 @@ class Search:
         for _ in range(SearchSettings.followed):
             if best == NULL or self.ended:
                 return best
-            before, best = best, self._along(best)
+            before = best
+            self._along(best)
+            best = self._round(NULL, SearchSettings.leaders)
             if best == before:
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
 
-    def _along(self, guess: Hypothesis) -> Hypothesis:
-        """The best single effect along the motion that a guess makes of the data."""
+    def _along(self, guess: Hypothesis) -> None:
+        """Begin again along the motion that a guess makes of the data."""
         self.say(f"searching again with {' + '.join(guess)} in the model")
         self.start(self._settle(guess))
         self.visit(guess)
-        return self._round(NULL, SearchSettings.leaders)
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with several effects, each of which changes it, and grow."""
@@ -130,9 +134,7 @@ class Search:
             if len(best) < 2 or self.ended:
                 break
             before = best
-            self.say(f"searching again with {' + '.join(best)} in the model")
-            self.start(self._settle(best))
-            self.visit(best)
+            self._along(best)
             best = self._grow(best)
             if best == before:
                 break
@@ -168,15 +170,10 @@ class Search:
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
         """Refit `given` with one more effect, of the likeliest ones; the best of all points."""
-        self._refit_leaders(given, leaders, least)
-        if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
-            for structure in sorted(self.problem.structures):
-                self.visit((structure,))
-        return self.best()
-
-    def _refit_leaders(self, given: Hypothesis, leaders: int, least: float) -> None:
         settings = SearchSettings
-        table = self._extensions(given)
+        table = self.base.table
+        if given:  # linear evidence of it and one more effect
+            table = self.base.ranker(self.points[given].mode.linear).table(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
         reach = max(settings.far, settings.far_share * gain)
@@ -191,12 +188,10 @@ class Search:
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
-
-    def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
-        """Linear evidence of `given` plus one effect."""
-        if given == NULL:
-            return self.base.table
-        return self.base.ranker(self.points[given].mode.linear).table(given)
+        if given == NULL and self.points[NULL].fitted_error > settings.structural:
+            for structure in sorted(self.problem.structures):
+                self.visit((structure,))
+        return self.best()
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
@@ -225,13 +220,6 @@ class Search:
                 break
             best = self._grow(best)
         return best
-
-    def _promising(self) -> list[Hypothesis]:
-        """Refitted hypotheses that gained a good share of what the best one gained."""
-        null = self.points[NULL].log_evidence
-        gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-        least = SearchSettings.promising * max(gains.values())
-        return [h for h, gain in gains.items() if gain > least]
 
     def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
         """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""

@@ -71,7 +71,7 @@ def simplest(search: Search, selection: Selection) -> Selection:
     """
     best = selection.best
     _thin(search, best)
-    known = _known_parts(search, best)
+    known = [h for h in search.points if h and set(h) <= set(best)]  # it and its parts
     least = min(known, key=lambda h: window_powers(search, h).sum())
     equal = [h for h in known if _is_enough(search, h, least)]
     fine = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
@@ -81,7 +81,7 @@ def simplest(search: Search, selection: Selection) -> Selection:
     if chosen == best:
         return selection
     # the evidence proposed this one as a part of the best only: alone it need not be the likeliest
-    count, parts = len(search.problem.candidates), _known_parts(search, chosen)
+    count, parts = len(search.problem.candidates), [h for h in known if set(h) <= set(chosen)]
     chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
     return _instead(search, selection, chosen)
 
@@ -96,11 +96,6 @@ def _thin(search: Search, best: Hypothesis) -> None:
         least = min(least, rest, key=lambda h: window_powers(search, h).sum())
         if not _is_enough(search, rest, least):
             break
-
-
-def _known_parts(search: Search, hypothesis: Hypothesis) -> list[Hypothesis]:
-    """The hypothesis and all refitted ones with some of its effects."""
-    return [h for h in search.points if h and set(h) <= set(hypothesis)]
 
 
 def _parts_of(hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -147,14 +142,15 @@ def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Select
             set(chosen) < set(other) and dropped & set(other)
         ):
             dismissed.add(other)
-    remark = _remark(search, selection.best, chosen)
-    return replace(
-        selection,
-        best=chosen,
-        dismissed=frozenset(dismissed),
-        rivals=tuple(sorted(rivals)),
-        remarks=(*selection.remarks, remark),
+    gone = [e for e in selection.best if e not in chosen]
+    nats = search.points[selection.best].log_evidence - search.points[chosen].log_evidence
+    remark = (
+        f"{' and '.join(gone)} would fit these readings better (by {nats:.0f} nats), but "
+        "predict left-out data little or no better, and are left out; logs of other motions would "
+        "tell"
     )
+    remarks, smaller = (*selection.remarks, remark), frozenset(dismissed)
+    return Selection(chosen, selection.p_value, smaller, tuple(sorted(rivals)), remarks)
 
 
 def is_unsupported(search: Search, best: Hypothesis) -> bool:
@@ -197,16 +193,6 @@ def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     rows = search.points[larger].windowed.count.sum()
     left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
     return window_gain(search, larger, smaller).nats < SHARE * left
-
-
-def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
-    dropped = [e for e in best if e not in chosen]
-    nats = search.points[best].log_evidence - search.points[chosen].log_evidence
-    return (
-        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but "
-        "predict left-out data little or no better, and are left out; logs of other motions would "
-        "tell"
-    )
 
 
 def selected(search: Search, best: Hypothesis, p_value: float) -> Selection:

@@ -99,14 +99,8 @@ def structure_row(
         values[name] = Value(value, low, high, p.unit)
     share = share_of(first.probabilities(), [structure])[structure]
     share = max(share, float(expit(nats)) if nats > 0.0 else 0.0)
-    gain = left_out(first, _likeliest_with(first, structure)).nats
+    gain = left_out(first, (structure,)).nats
     return Ranked(structure, share, values, (), *errors, gain)
-
-
-def _likeliest_with(search: Search, effect: str) -> Hypothesis:
-    """The likeliest hypothesis that has this effect."""
-    having = [h for h in search.points if effect in h]
-    return max(having, key=lambda h: search.points[h].log_evidence)
 
 
 def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hypothesis) -> Answer:

@@ -66,6 +66,10 @@ class Candidate:
         """Name of the switch in theta: `seal_friction.F_c`."""
         return f"{self.effect}.{self.lead.name}"
 
+    def reported(self, parameter: Parameter) -> tuple[str, str]:
+        """Name and unit of a parameter as the catalogue has it."""
+        return self.reciprocal.get(parameter.name, (parameter.name, parameter.unit))
+
     def keys(self) -> dict[str, Parameter]:
         """Every parameter by its name in theta."""
         return {f"{self.effect}.{p.name}": p for p in self.parameters}

@@ -66,10 +66,12 @@ def resample(
     torque = np.stack([_held(log[f"{leg}/hip/tau"][keep]) for leg in legs], axis=1)
     valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
     sent = tuple(pulses(time, _held(log[v][keep])) for v in valves)
-    sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
-    times = log.meta.get("noise_time") or {}
+    noise, times = (log.meta.get(key) or {} for key in ("noise", "noise_time"))
+    known = [noise.get(c, noise.get(f"{c} [{log.unit(c)}]")) for c in channels]
+    values = zip(channels, known, raw.T, strict=True)
+    sigma = np.array([_sigma(c, y) if k is None else float(k) for c, k, y in values])
     memory = np.array([times.get(c, np.nan) for c in channels])
-    stated = np.array([_stated(log, c) is not None for c in channels])
+    stated = np.array([k is not None for k in known])
     time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
     less = np.where(np.isfinite(memory), 1.0, np.sqrt(count))  # the mean of white noise is smaller
@@ -82,23 +84,11 @@ def _held(values: Array) -> Array:
     return np.nan_to_num(values[np.maximum.accumulate(index)])
 
 
-def _sigma(log: Trajectory, channel: str, values: Array) -> float:
-    """Noise of one sample: as the sidecar says, else as its values tell, else the usual one."""
-    stated = _stated(log, channel)
-    if stated is not None:
-        return stated
+def _sigma(channel: str, values: Array) -> float:
+    """Noise of one sample as its values tell, else the usual one."""
     if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
         return CHANNELS[channel.split("/")[-1]][1]
     return max(difference_sigma(values), FINEST)
-
-
-def _stated(log: Trajectory, channel: str) -> float | None:
-    """Noise of a channel as the sidecar says, if it does."""
-    noise = log.meta.get("noise") or {}
-    for key in (channel, f"{channel} [{log.unit(channel)}]"):
-        if key in noise:
-            return float(noise[key])
-    return None
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:

@@ -7,6 +7,7 @@ the contact forces are unknown too, so only the force that they cannot explain i
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -31,9 +32,9 @@ from kemba.identify.robot.filter import System, gains, smooth_with_band
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import QUIET, PlaceSettings, densities
 from kemba.identify.robot.state import LinearisedState
-from kemba.mechanism import Cylinder
 
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
+SIDES = ("extend", "retract")
 
 
 def _row_channels(physics: Physics) -> tuple[str, ...]:
@@ -44,56 +45,34 @@ def _row_channels(physics: Physics) -> tuple[str, ...]:
 
 def describe(state: LinearisedState) -> Rows:
     """Rows of the logs that are data, run by run, channel by channel."""
-    physics, batch, inputs = state.physics, state.batch, state.motion.states[1]
-    channels = _row_channels(physics)
-    m = len(channels)
-    found: dict[str, list[Texts]] = {}
-    for i, log in enumerate(batch.resampled):
-        own = state.mask[:, i].T
-        time = np.zeros(batch.n)
-        time[: len(log.time)] = log.time
-        phase = np.full(batch.n, "", dtype=object)
-        phase[: len(log.time)] = state.schedules[i].phase
-        sigma = np.append(log.sigma, [PlaceSettings.ground] * (m - len(log.sigma)))
-        whole = {
-            "run": np.full(own.shape, i),
-            "channel": np.broadcast_to(np.arange(m)[:, None], own.shape),
-            "time": np.broadcast_to(time, own.shape),
-            "phase": np.broadcast_to(phase, own.shape),
-            "mode": valve_modes(physics, inputs[:, i], channels).T,
-            "sigma": np.broadcast_to(sigma[:, None], own.shape),
-        }
-        for key, values in whole.items():
-            found.setdefault(key, []).append(values[own])
-    joined = {key: np.concatenate(parts) for key, parts in found.items()}
-    return Rows(channels=channels, **joined)  # type: ignore[arg-type]
+    batch, channels, shape = state.batch, _row_channels(state.physics), state.mask.shape
+    phase = np.full(shape[:2], "", dtype=object)
+    for i, schedule in enumerate(state.schedules):
+        phase[: len(schedule.phase), i] = schedule.phase
+    sigma = np.full(shape[1:], PlaceSettings.ground)
+    sigma[:, : batch.sigma.shape[1]] = batch.sigma
+    whole = {
+        "run": np.arange(shape[1])[:, None],
+        "channel": np.arange(len(channels)),
+        "time": batch.time[..., None],
+        "phase": phase[..., None],
+        "mode": valve_modes(state.physics, state.motion.states[1], channels),
+        "sigma": sigma,
+    }
+    rows = {key: state.pick(np.broadcast_to(values, shape)) for key, values in whole.items()}
+    return Rows(channels=channels, **rows)  # type: ignore[arg-type]
 
 
 def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Texts:
-    """Mode (n, m) of the channel's own leg; of the body: the first leg's."""
+    """Mode (n, L, m) of the channel's own leg; of the body: the first leg's."""
     texts = {}
     for leg in physics.legs:
-        on = [
-            inputs[:, physics.inputs.index(f"{leg}/valve/{side}")] > 0.5
-            for side in ("extend", "retract")
-        ]
-        texts[leg] = MODES[2 * on[0].astype(int) + on[1]]
+        extend, retract = (
+            inputs[..., physics.inputs.index(f"{leg}/valve/{side}")] > 0.5 for side in SIDES
+        )
+        texts[leg] = MODES[2 * extend.astype(int) + retract]
     first = physics.legs[0]
-    return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=1)
-
-
-def _air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
-    """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
-    push = []
-    areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
-    for chamber, area in areas.items():
-        name = f"{prefix}chamber/{chamber}/"
-        known = states.get(f"{name}F")
-        push.append((states[f"{name}P"] - ATMOSPHERE) * area if known is None else known)
-    return np.asarray(push[0] - push[1])
-
-
-SIDES = ("extend", "retract")
+    return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=-1)
 
 
 def robot_operating_point(state: LinearisedState) -> OperatingPoint:
@@ -109,11 +88,25 @@ def robot_operating_point(state: LinearisedState) -> OperatingPoint:
 
 
 def air_forces(state: LinearisedState) -> Array:
-    """Push of the model's air [N] on every leg's rod (n, L, legs)."""
+    """Push of the model's air [N] on every leg's rod (n, L, legs), by chambers' forces or
+    pressures."""
     names = [q.name for q in state.physics.model.states.values()]
     states = dict(zip(names, np.moveaxis(state.motion.states[0], -1, 0), strict=True))
-    cylinder, legs = state.physics.mechanism.need_cylinder(), state.physics.legs
-    return np.stack([_air_force(states, cylinder, f"{leg}/") for leg in legs], axis=-1)
+    cylinder = state.physics.mechanism.need_cylinder()
+
+    def push(name: str, area: float) -> Array:
+        known = states.get(f"{name}/F")
+        pressed = known is None
+        return np.asarray((states[f"{name}/P"] - ATMOSPHERE) * area if pressed else known)
+
+    return np.stack(
+        [
+            push(f"{leg}/chamber/extend", cylinder.area_extend)
+            - push(f"{leg}/chamber/retract", cylinder.area_retract)
+            for leg in state.physics.legs
+        ],
+        axis=-1,
+    )
 
 
 def changes(log: ResampledLog, legs: Sequence[str]) -> Changes:
@@ -139,55 +132,36 @@ def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
 
     A force is looked for where it shows: of hips and body in flight, of rods off their stops.
     """
+    y, rate, batch, legs = state.motion.y, state.motion.rate, state.batch, len(state.physics.legs)
     flying = [(s.phase == "flight").astype(float) for s in state.schedules]
-    where = state.batch.pad(flying, 0.0)[..., None] > 0.5
-    y, rate = state.motion.y, state.motion.rate
-    found = [_rods(state), _hips(state, where)]
-    for name, k in BODY.items():
-        quantities = {
-            "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
-            "position [m]": np.where(where, y[..., [k]], np.nan),
-        }
-        found.append(
-            ForceChannel(name, "N", USUAL_FORCE_BODY, quantities, _force_columns(state, [k]))
-        )
-    return found
-
-
-def _rods(state: LinearisedState) -> ForceChannel:
-    motion, batch, legs = state.motion, state.batch, len(state.physics.legs)
+    flight = batch.pad(flying, 0.0)[..., None] > 0.5
     stopped = batch.pad([(s.low | s.high).astype(float) for s in state.schedules], 1.0)
-    where = (stopped < 0.5) & batch.valid[..., None]
-    quantities = {
-        "speed [m/s]": motion.rate[..., 3 + legs :],
-        "position [mm]": 1e3 * motion.y[..., 3 + legs :],
-        "air force [N]": air_forces(state),
-    }
-    return ForceChannel(
-        "rods",
-        "N",
-        ROD,
-        {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        _force_columns(state, range(3 + legs, 3 + 2 * legs)),
-        {side: _after(state, f"valve/{side}") for side in SIDES},
-    )
+    off_stops = (stopped < 0.5) & batch.valid[..., None]
 
+    def channel(
+        name: str, unit: str, usual: float, ports: slice, where: Flags, values: dict[str, Array],
+        after: Mapping[str, str] = MappingProxyType({}),
+    ) -> ForceChannel:  # fmt: skip
+        places = range(*ports.indices(y.shape[-1]))
+        seen = {label: np.where(where, value, np.nan) for label, value in values.items()}
+        rises = {label: _after(state, command) for label, command in after.items()}
+        return ForceChannel(name, unit, usual, seen, _force_columns(state, places), rises)
 
-def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
-    legs = range(3, 3 + len(state.physics.legs))
-    quantities = {
-        "speed [rad/s]": state.motion.rate[..., legs],
-        "angle [rad]": state.motion.y[..., legs],
-        "torque [N.m]": state.batch.torque,
-    }
-    return ForceChannel(
-        "hips",
-        "N.m",
-        HIP,
-        {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        _force_columns(state, legs),
-        {"hip/tau": _after(state, "hip/tau")},
-    )
+    rods, hips = slice(3 + legs, 3 + 2 * legs), slice(3, 3 + legs)
+    at_rods = {"speed [m/s]": rate[..., rods], "position [mm]": 1e3 * y[..., rods],
+               "air force [N]": air_forces(state)}  # fmt: skip
+    at_hips = {"speed [rad/s]": rate[..., hips], "angle [rad]": y[..., hips],
+               "torque [N.m]": batch.torque}  # fmt: skip
+    sent = {side: f"valve/{side}" for side in SIDES}
+    found = [
+        channel("rods", "N", ROD, rods, off_stops, at_rods, sent),
+        channel("hips", "N.m", HIP, hips, flight, at_hips, {"hip/tau": "hip/tau"}),
+    ]
+    for name, k in BODY.items():
+        own = slice(k, k + 1)
+        at = {"speed [m/s]": rate[..., own], "position [m]": y[..., own]}
+        found.append(channel(name, "N", USUAL_FORCE_BODY, own, flight, at))
+    return found
 
 
 def _after(state: LinearisedState, command: str) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class LinearisedMotion:
     sinking: Array  # (n, L, legs) speed of the feet, down, steady
     links: Array  # (n, L, k, figures) force per share by which a link's mass or inertia is off
     less_grip: Array  # (n, L, k) force that is missing per unit of friction coefficient
-    shift: Array  # (n, L, k) acceleration that the model adds to the reference's
+    shift: Array  # (n, L, k) acceleration that the model adds to the reference's; 0 at ends
     A: tuple[Array, Array]  # (n, L, k, k) each: slopes of the acceleration along q and v
     channels: Array  # (n, L, k, c) generalised force per unknown force: channels, then feet
 
@@ -56,13 +55,7 @@ class LinearisedMotion:
     def defect(self, force: Array) -> Array:
         """Acceleration (n, L, k) that the model adds to the reference's, with a force (n, L, k)
         that the motion needs beyond model and contact."""
-        return self._live_shift + self.response(force)
-
-    @cached_property
-    def _live_shift(self) -> Array:
-        """The shift (n, L, k) in nodes that are part of a run."""
-        live = np.any(self.inverse != 0.0, axis=(2, 3))[..., None]
-        return np.where(live, self.shift, 0.0)
+        return self.shift + self.response(force)
 
     def system_with(self, density: Array, h: Array) -> System:
         """The filter's system with other densities (n, L, c) of unknown force; `h` (n, L) [s]."""
@@ -132,7 +125,7 @@ def linearise_along(
     A_q, A_v = (-inverse @ batch.deep(a) for a in physics.call("stiffness", *mid, s, u, p=p))
     pressed = slip * np.maximum(normal, 0.0)
     less_grip = (pressed[..., None] * Jf[..., 0::2, :]).sum(axis=2)
-    unknown = scatter(inverse @ channels, density, batch.h)
+    unknown, ends = scatter(inverse @ channels, density, batch.h), _run_ends(batch)[..., None]
     system = _filter_system(batch, schedules, (Jy, Jf), (A_q, A_v), unknown)
     return LinearisedMotion(
         ref,
@@ -140,7 +133,7 @@ def linearise_along(
         states,
         coloured(system, noise, batch.sigma, batch.h),
         system,
-        np.where(_run_ends(batch)[..., None, None], 0.0, inverse),
+        np.where(ends[..., None], 0.0, inverse),
         contact,
         normal,
         y,
@@ -150,7 +143,7 @@ def linearise_along(
         steady(-feet_rate[..., 1::2], dt),
         batch.deep(physics.call("links", *mid)[0]),
         less_grip,
-        shift,
+        np.where(ends, 0.0, shift),
         (A_q, A_v),
         channels,
     )

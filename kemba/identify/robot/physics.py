@@ -277,18 +277,15 @@ class Physics:
         key = (i, p[self.lengths].tobytes())
         if key not in self._knees:
             self._knees = {k: v for k, v in self._knees.items() if k[1] == key[1]}
-            self._knees[key] = self._folded(i, p)
+            m, k = self.mechanism, 3 + len(self.legs) + i
+            low, high = m.coordinates[k].lower, m.coordinates[k].upper
+            grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)
+            q = np.zeros((len(grid), m.n))
+            q[:, k] = grid
+            x = self.call("measured", q, 0 * q, p=p)[0][:, k]
+            order = np.argsort(x)
+            self._knees[key] = x[order], grid[order]
         return self._knees[key]
-
-    def _folded(self, i: int, p: Array) -> tuple[Array, Array]:
-        m, k = self.mechanism, 3 + len(self.legs) + i
-        low, high = m.coordinates[k].lower, m.coordinates[k].upper
-        grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)
-        q = np.zeros((len(grid), m.n))
-        q[:, k] = grid
-        x = self.call("measured", q, 0 * q, p=p)[0][:, k]
-        order = np.argsort(x)
-        return x[order], grid[order]
 
     def arrange(self, torque: Array, valves: Array) -> Array:
         """Inputs (nu, N) in the model's order from torques (legs, N) and valves (2 legs, N)."""

@@ -63,25 +63,19 @@ class Inputs:
     """One run cut at every switching.
 
     `h` (N,) [s]: steps of the integration; `given`: q, v and inputs (N, .) over them; `index` (n,)
-    of each node among them; `width` (n,) [s] of each node's step. `inputs` (n, nu): mean over each
-    node's step.
+    of each node among them; `width` (n,) [s] of each node's step.
     """
 
     h: Array
     given: tuple[Array, Array, Array]
     index: Index
     width: Array
-    inputs: Array
 
     def means(self, values: Array) -> Array:
         """(n, k): values (N, k) averaged over the step from each node."""
-        return _means(values, self.h, self.index, self.width)
-
-
-def _means(values: Array, h: Array, index: Index, width: Array) -> Array:
-    padded = np.append(values * h[:, None], 0 * values[:1], axis=0)
-    sums = np.add.reduceat(padded, index, axis=0)
-    return np.vstack([(sums / width[:, None])[:-1], values[-1:]])
+        padded = np.append(values * self.h[:, None], 0 * values[:1], axis=0)
+        sums = np.add.reduceat(padded, self.index, axis=0)
+        return np.vstack([(sums / self.width[:, None])[:-1], values[-1:]])
 
 
 def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
@@ -96,7 +90,7 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves).T
         width = np.append(np.diff(log.time), 1.0)
-        found.append(Inputs(h, (q, v, u), index, width, _means(u, h, index, width)))
+        found.append(Inputs(h, (q, v, u), index, width))
     return found
 
 
@@ -107,7 +101,7 @@ def air_states(
     that are asked for (None: all)."""
     moving = p[physics.moves]
     states = [d.means(physics.states.run(d.h, *d.given, moving, among)) for d in inputs]
-    return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
+    return batch.pad(states, 0.0), batch.pad([d.means(d.given[2]) for d in inputs], 0.0)
 
 
 def _at(time: Array, values: Array, times: Array) -> Array:
@@ -228,11 +222,6 @@ class LinearisedState:
     # what was `seen` with the lengths asked for last: a column of slopes seldom changes them
     _last_seen: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
-    @cached_property
-    def _at_base(self) -> Array:
-        """Free parameters (k,) where the model was linearised."""
-        return self.physics.at(self.base)
-
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
         theta see it; NaN where nothing was measured."""
@@ -247,9 +236,7 @@ class LinearisedState:
     def seen(self, theta: Theta) -> tuple[Array, Array]:
         """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
         of a robot with the lengths at theta."""
-        p = self.physics.at(theta)
-        at = self._at_base
-        own = self.physics.lengths
+        p, at, own = self.physics.at(theta), self.physics.at(self.base), self.physics.lengths
         if np.array_equal(p[own], at[own]):
             return self.motion.y, self.motion.places
         key = p[own].tobytes()
