@@ -111,7 +111,6 @@ RULES = [
          values={"tolerances": (1.0,)}),
     Rule("steps to the mode", "infer.mode:SmallEffectsSettings",
          values={"rounds": 0}),
-    Rule("other shapes", "infer.refit:RefitSettings", values={"factor": 1e9}),
     Rule("enlarged noise", "infer.significance:_enlarged",
          lambda own, left, root, power: own.T @ left, always),
     Rule("material", "infer.selection:material", lambda s, h: h),

@@ -24,7 +24,7 @@ from blind import report
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 
 from kemba.identify.design.rig import design_rig_test
-from kemba.identify.design.separation import ExperimentSettings, Judged
+from kemba.identify.design.separation import ExperimentSettings, JudgedTest
 from kemba.model.spec import load_model
 from kemba.scenarios.share import wilson
 
@@ -59,7 +59,7 @@ def run(truth: str, other: str, seed: int) -> dict[str, Any]:
         seconds = time.process_time() - started
         assert design is not None
 
-        def told(judged: Judged) -> float | None:
+        def told(judged: JudgedTest) -> float | None:
             if judged.log_s > LONGEST:
                 return None
             logs = machine.done(judged.test, stroke, folder)

@@ -17,7 +17,6 @@ from kemba.identify.answer import (
 )
 from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
 from kemba.identify.infer.formula import Formula, look
-from kemba.identify.infer.identifiability import Identifiability, identifiability
 from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_aliases
 from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
 from kemba.identify.infer.residual import drifting, rest_of
@@ -30,7 +29,14 @@ from kemba.identify.infer.selection import (
     quoted,
     selected,
 )
-from kemba.identify.infer.significance import NullTest, best_gain, null_test, smallest_detectable
+from kemba.identify.infer.significance import (
+    Identifiability,
+    NullTest,
+    best_gain,
+    identifiability,
+    null_test,
+    smallest_detectable,
+)
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.structure import (
     Rebuilt,

@@ -94,7 +94,8 @@ def _adaptive(
             break
         x, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
         finer = local_fit(values, width, step, 5, 1)
-        gain, finer_gain = (_gains(n, width, step, order, colour) for order in (3, 5))
+        at = np.minimum(np.arange(n), width) + np.maximum(np.arange(n) - (n - 1 - width), 0)
+        gain, finer_gain = (_slope_sigma(width, step, order, colour)[at] for order in (3, 5))
         noise = (sigma * gain) ** 2
         bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
         risk = noise + np.maximum(bias, 0.0)
@@ -104,15 +105,9 @@ def _adaptive(
     return position, _mean(rate, 1), np.sqrt(best)
 
 
-def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) -> Array:
-    """1 sigma (n,) [s-1] of the slope of `local_fit` per stated sigma of the values."""
-    gain = _slope_sigma(width, step, order, colour)
-    return np.concatenate([gain[:width], np.full(n - 2 * width, gain[width]), gain[width + 1 :]])
-
-
 @lru_cache(maxsize=256)
 def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> Array:
-    """The same (2 width + 1,) at each place of the window."""
+    """1 sigma [s-1] of `local_fit`'s slope per stated sigma at each place of the window."""
     slope = weights(width, order, 1)
     if not colour.lags:
         return np.asarray(colour.white * np.linalg.norm(slope, axis=1) / step)
@@ -150,39 +145,28 @@ REST = 2e-3  # speed up to which the piston rests [m.s-1]
 MOST = 10.0
 
 
-@dataclass(frozen=True)
-class _Quiet:
-    """One log on an even grid: what the cubic leaves (n,) in sigmas, where it rests, step [s]."""
-
-    left: Array
-    rest: Flags
-    step: float
-
-
 def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     """Noise of the position sensor that all `logs` (times [s] and positions [m], both (n,)) share,
     in each log's `difference_sigma`; white where the piston rests too little to tell."""
     quiet = [found for time, x in logs if (found := _quiet(time, x)) is not None]
     settings = ColourSettings
-    if sum(int(q.rest.sum()) for q in quiet) < settings.fewest:
+    if sum(int(np.isfinite(left).sum()) for left, _ in quiet) < settings.fewest:
         return ChannelNoise()
-    n = max(len(q.left) for q in quiet)
-    errors = np.full((n, len(quiet), 1), np.nan)
-    for i, q in enumerate(quiet):
-        errors[: len(q.left), i, 0] = np.where(q.rest, q.left, np.nan)
-    step = float(np.median([q.step for q in quiet]))
+    errors = np.full((max(len(left) for left, _ in quiet), len(quiet), 1), np.nan)
+    for i, (left, _) in enumerate(quiet):
+        errors[: len(left), i, 0] = left
+    step = float(np.median([step for _, step in quiet]))
     memories = (0.0, *settings.memories)
-    columns = [_expected(memory, step) for memory in memories]
-    counts = pairs(errors)
+    columns, counts = [_expected(memory, step) for memory in memories], pairs(errors)
     measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
     kinds = [Kind(0, memory) for memory in memories]
-    most = np.array([MOST])
-    a, b = weighted(columns, measured, counts)
-    return chosen_noise(a, b, kinds, most, np.array([True]))[0]
+    told = weighted(columns, measured, counts)
+    return chosen_noise(*told, kinds, np.array([MOST]), np.array([True]))[0]
 
 
-def _quiet(time: Array, x: Array) -> _Quiet | None:
-    """A log without its motion; None where it is too short."""
+def _quiet(time: Array, x: Array) -> tuple[Array, float] | None:
+    """What the cubic leaves (n,) of x, in sigmas, NaN where it moves, and the step [s]; None of a
+    log that is too short."""
     grid, values, step = _even_grid(time, x)
     if len(grid) < 2 * QUIET_WIDTH + 1:
         return None
@@ -190,7 +174,7 @@ def _quiet(time: Array, x: Array) -> _Quiet | None:
     rest = maximum_filter1d(np.abs(v), 2 * QUIET_WIDTH + 1) < REST
     rest[:QUIET_WIDTH] = rest[-QUIET_WIDTH:] = False
     sigma = max(difference_sigma(x[np.isfinite(x)]), FINEST)
-    return _Quiet((values - smooth) / sigma, rest, step)
+    return np.where(rest, (values - smooth) / sigma, np.nan), step
 
 
 def _expected(memory: float, step: float) -> Array:
@@ -281,18 +265,13 @@ def prepare(
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
     known = ~_unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & known & telling(y, sigma[c]) for c, y in measured.items()}
-    within = 0.0 if on_rows else _seen_within(log.time)
+    row = float(np.median(np.diff(log.time)))  # within long ones valve edges are blurred
+    within = row if row > ROW and not on_rows else 0.0
     # a change that a row shows happened since the row before
     seen = np.concatenate([log.time[:1], 0.5 * (log.time[1:] + log.time[:-1])])
     extend, retract = (pulses(seen if within else log.time, u) for u in sent)
     modes = np.char.add(*on)
     return BenchLog(name, motion, (extend, retract), measured, sigma, modes, keep, within)
-
-
-def _seen_within(time: Array) -> float:
-    """Time [s] between rows where it is so long that valve edges are blurred, else 0."""
-    step = float(np.median(np.diff(time)))
-    return step if step > ROW else 0.0
 
 
 def _noise_of(channel: str, y: Array) -> float:

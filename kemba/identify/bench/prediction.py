@@ -81,7 +81,12 @@ class RigModel:
         seen = motion.time - late
         times, at_sample = _breakpoints(seen, np.concatenate([instants(v) for v in valves]))
         u = np.stack([is_on(v, times) for v in valves])
-        s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
+        begin = self._along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
+        begin += np.array([(start or {}).get(name, 0.0) for name in self.state_names])
+        middle = 0.5 * (times[:-1] + times[1:])
+        along = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
+        driven = np.stack([np.diff(times), *along, *u[:, :-1]])
+        s = self._along.run(begin, driven, p)[:, at_sample]
         blurred = np.stack([share(v, seen) for v in valves])
         n, moved = len(seen), Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
         x, (v0, a) = moved.value, moved.rates
@@ -93,15 +98,6 @@ class RigModel:
             v = v0 + place * motion.v_sigma
             force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0][0]
         return Prediction(force, out[1:3].T, blurred.T, states)
-
-    def _integrate(
-        self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
-    ) -> Array:
-        middle = 0.5 * (times[:-1] + times[1:])
-        s0 = self._along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
-        s0 += np.array([start.get(name, 0.0) for name in self.state_names])
-        moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
-        return self._along.run(s0, np.stack([np.diff(times), *moved, *u[:, :-1]]), p)
 
     def _mapped(self, kind: str, n: int) -> Buffered:
         if (kind, n) not in self._maps:
@@ -255,7 +251,11 @@ def _timed(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
 
 
 def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
-    options = [_begun(c, log.motion.time[0]) for c in log.commands]
+    begin = log.motion.time[0]
+    options = [  # as they are, and with the first pulse switched on when the log starts
+        [sent, [(begin, sent[0][1]), *sent[1:]]] if sent and np.isinf(sent[0][0]) else [sent]
+        for sent in log.commands
+    ]
     trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
     if len(trials) == 1:
         return log
@@ -267,10 +267,3 @@ def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
         return float(np.mean(np.abs(r[early])))
 
     return min(trials, key=cost)
-
-
-def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tuple[float, float]]]:
-    """The pulses as they are, and with the first one switched on when the log starts."""
-    if not intervals or np.isfinite(intervals[0][0]):
-        return [intervals]
-    return [intervals, [(start, intervals[0][1]), *intervals[1:]]]

@@ -116,7 +116,10 @@ class BenchProblem(ColouredProblem):
         logs, self.drift = tuple(runs), drift
         self.model = model
         self.runs = tuple(log.name for log in logs)
-        self.candidates = effect_candidates(model) | sensor_candidates(_sensor_sigmas(logs), model)
+        median = {"piston/F": [log.sigma["piston/F"] for log in logs],
+                  "piston/x": [log.motion.x_sigma for log in logs]}  # fmt: skip
+        sigmas = {channel: float(np.median(values)) for channel, values in median.items()}
+        self.candidates = effect_candidates(model) | sensor_candidates(sigmas, model)
         row = max(log.seen_within for log in logs)
         hidden = {
             n: c for n, c in self.candidates.items() if c.lead.unit == "s" and c.lead.size < row
@@ -366,10 +369,3 @@ def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     return BenchProblem(
         [clocks.without_drift(run, *drift) for run in runs(logs)], model, drift=drift
     )
-
-
-def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:
-    """Noise (1 sigma) of the force [N] and of the position [m], the median over the logs."""
-    force = float(np.median([log.sigma["piston/F"] for log in logs]))
-    position = float(np.median([log.motion.x_sigma for log in logs]))
-    return {"piston/F": force, "piston/x": position}

@@ -25,7 +25,7 @@ from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
-    Judged,
+    JudgedTest,
     Proposal,
     Rivals,
     Separation,
@@ -133,13 +133,13 @@ def _menu(stroke: float) -> list[Rig]:
     ]
 
 
-def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[Judged]:
+def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedTest]:
     """Every standard test; none where a rig cannot show two of the rivals."""
     for rig in _menu(bench.stroke):
         found = separation(bench.problem(rig), rivals)
         if found is None:
             return
-        yield Judged(rig, found, log_time(rig, bench.stroke))
+        yield JudgedTest(rig, found, log_time(rig, bench.stroke))
 
 
 class RigCourseSettings:
@@ -268,7 +268,7 @@ class RigDesign(Proposal):
     """A proposal of rigs; `chosen` is the one to be done."""
 
     @property
-    def chosen(self) -> Judged:
+    def chosen(self) -> JudgedTest:
         """The designed test, except where only the standard one settles the question."""
         clear = ExperimentSettings.clear
         least, other = self.designed.evidence.least, self.standard.evidence.least
@@ -337,7 +337,7 @@ def design_rig_test(
     return RigDesign(before, after, tried)
 
 
-def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> Judged:
+def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedTest:
     """A test, its evidence between the nearest rivals by a fit in place of slopes."""
     problem = bench.problem(rig)
     straight = separation(problem, rivals)
@@ -350,7 +350,7 @@ def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> Judged:
     exact = _with_logs(problem, logs)
     fitted = misfit(exact, best_fit(exact, rivals, nearest))
     nats = {**straight.nats, nearest: min(fitted, straight.least)}
-    return Judged(rig, Separation(first, nats), log_time(rig, bench.stroke))
+    return JudgedTest(rig, Separation(first, nats), log_time(rig, bench.stroke))
 
 
 def propose(

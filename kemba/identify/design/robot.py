@@ -22,7 +22,7 @@ from kemba.identify.answer import read_answer
 from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
-    Judged,
+    JudgedTest,
     Proposal,
     Rivals,
     Separation,
@@ -147,7 +147,7 @@ STANDARD = Sway(angle=0.1, leans=2, duration=0.9, pace=1.0)
 
 
 @dataclass(frozen=True)
-class Tried(Judged):
+class Tried(JudgedTest):
     """A sway as it was simulated."""
 
     test: Sway

@@ -7,6 +7,7 @@ and how each log begins; all by their slopes. Of 50 pairs on standard tests a fi
 steps settled the same (by hand).
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -131,7 +132,7 @@ class Separation:
 
 
 @dataclass(frozen=True)
-class Judged:
+class JudgedTest:
     """A test, the evidence that its log is expected to hold, and the seconds of that log."""
 
     test: Any
@@ -145,15 +146,15 @@ class Judged:
 
 
 @dataclass(frozen=True)
-class Proposal:
+class Proposal(ABC):
     """The best standard test and the designed one; `tried`: how many were looked at."""
 
-    standard: Judged
-    designed: Judged
+    standard: JudgedTest
+    designed: JudgedTest
     tried: int
 
     @property
-    def chosen(self) -> Judged:
+    def chosen(self) -> JudgedTest:
         """The test that is to be done."""
         return self.designed
 
@@ -168,9 +169,9 @@ class Proposal:
         return self.chosen.evidence.first, self.chosen.evidence.nearest
 
     @property
+    @abstractmethod
     def sentence(self) -> str:
         """What the test gains, in words."""
-        raise NotImplementedError
 
     def json(self) -> dict[str, Any]:
         """The figures behind the sentence; `designed` and `standard` have the same keys."""

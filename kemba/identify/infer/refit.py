@@ -2,7 +2,7 @@
 Marquardt's steps. Slopes along nuisance parameters are those of the null, but for those that are
 `curved`, so that only the few columns of an effect are new in a step."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,7 +11,7 @@ from scipy.optimize import lsq_linear
 
 from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.problem.problem import Problem, bounded
-from kemba.identify.problem.types import Array, Parameter
+from kemba.identify.problem.types import Array
 
 
 class RefitSettings:
@@ -28,8 +28,6 @@ class RefitSettings:
     large = 40.0
     farthest = 3.0  # largest start of a switch, in sizes
     nearest = 0.1  # smallest start of a switch, in sizes
-    # a shape also starts at its default times and over this, if within two prior widths
-    factor = 3.0
     absurd = 1e6  # residuals are clipped at so many sigmas: finite, beyond all data
 
 
@@ -65,51 +63,21 @@ class Frozen:
 def refit(
     problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float], frozen: Frozen
 ) -> Fit:
-    """The best theta with these effects on, from `start` (and, where shapes exist, others)."""
-    best: Fit | None = None
-    for trial in _starts(problem, hypothesis, start):
-        fit = _LeastSquares(problem, hypothesis, trial, frozen).run()
-        if best is None or fit.cost < best.cost - 1e-6:
-            best = fit
-    assert best is not None
-    return best
-
-
-def _starts(
-    problem: Problem, hypothesis: Hypothesis, start: Mapping[str, float]
-) -> Iterable[dict[str, float]]:
-    """Effects start where `start` has them, but not at off; shapes also at other values."""
-    settings = RefitSettings
+    """The best theta with these effects on, from `start`; what it lacks begins at its usual shape,
+    a switch not at off, not too far out, and on its possible side."""
+    settings, keys = RefitSettings, {problem.candidates[e].key for e in hypothesis}
     theta = {k: v for k, v in start.items() if k in problem.nuisance}
-    shapes: list[tuple[str, Parameter]] = []
     for effect in hypothesis:
-        c = problem.candidates[effect]
-        for key, parameter in c.keys().items():
-            if key == c.key:
-                theta[key] = _inside(start.get(key, parameter.off), parameter)
-            else:
-                theta[key] = start.get(key, parameter.typical)
-                likely = settings.factor < np.exp(2.0 * parameter.size)
-                if key not in start and likely:
-                    shapes.append((key, parameter))
-    yield theta
-    for key, parameter in shapes:
-        for factor in (1 / settings.factor, settings.factor):
-            value = np.clip(parameter.typical * factor, parameter.lower, parameter.upper)
-            yield {**theta, key: float(value)}
-
-
-def _inside(value: float, parameter: Parameter) -> float:
-    """A start that is on, not too far out, and on the possible side."""
-    settings = RefitSettings
-    farthest = settings.farthest * parameter.size
-    step = np.clip(value - parameter.off, -farthest, farthest)
-    least = settings.nearest * parameter.size
-    if abs(step) < least:
-        step = least if step >= 0 or not parameter.signed else -least
-    if not parameter.signed:
-        step = max(step, least)
-    return float(np.clip(parameter.off + step, parameter.lower, parameter.upper))
+        for key, p in problem.candidates[effect].keys().items():
+            if key not in keys:
+                theta[key] = start.get(key, p.typical)
+                continue
+            least, farthest = settings.nearest * p.size, settings.farthest * p.size
+            step = float(np.clip(start.get(key, p.off) - p.off, -farthest, farthest))
+            if abs(step) < least or (step < 0.0 and not p.signed):
+                step = -least if step < 0.0 and p.signed else least
+            theta[key] = float(np.clip(p.off + step, p.lower, p.upper))
+    return _LeastSquares(problem, hypothesis, theta, frozen).run()
 
 
 class _LeastSquares:

@@ -7,9 +7,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.problem.candidates import leg_by_leg, link_figures, nominal_figures
+from kemba.identify.problem.candidates import (
+    leg_by_leg,
+    link_figures,
+    nominal_figures,
+    without_delay,
+)
 from kemba.identify.problem.types import Array, Flags, Theta
-from kemba.identify.robot.candidates import without_delay
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model

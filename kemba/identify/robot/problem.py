@@ -10,7 +10,13 @@ from typing_extensions import Self
 from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
-from kemba.identify.problem.candidates import sensor_candidates
+from kemba.identify.problem.candidates import (
+    extended,
+    ground_of,
+    in_the_air,
+    robot_candidates,
+    sensor_candidates,
+)
 from kemba.identify.problem.problem import Problem, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
 from kemba.identify.problem.structure import (
@@ -31,7 +37,6 @@ from kemba.identify.problem.types import (
     Theta,
 )
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
-from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
 from kemba.identify.robot.forces import (
     changes,
     describe,
