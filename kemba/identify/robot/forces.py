@@ -16,6 +16,7 @@ from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.problem.missing_force import dahl, end_terms, spans
+from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.types import (
     Array,
     Changes,
@@ -75,18 +76,6 @@ def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Tex
     return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=-1)
 
 
-def robot_operating_point(state: LinearisedState) -> OperatingPoint:
-    """The pistons along the motion on which the model was linearised."""
-    legs, motion = state.physics.legs, state.motion
-    pistons = slice(motion.y.shape[-1] - len(legs), None)
-    place = (motion.y[..., pistons], motion.rate[..., pistons], air_forces(state))
-    per_leg = np.moveaxis(np.stack(place, axis=-1), 2, 0)  # (legs, n, L, 3)
-    owners = [channel.split("/")[0] for channel in _row_channels(state.physics)]
-    own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
-    x, v, force = state.pick(np.stack(own, axis=2)).T
-    return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
-
-
 def air_forces(state: LinearisedState) -> Array:
     """Push of the model's air [N] on every leg's rod (n, L, legs), by chambers' forces or
     pressures."""
@@ -127,43 +116,6 @@ HIP = 0.5  # at a hip [N.m]
 ROD = 10.0  # on a rod [N]: friction of 6 to 8 N by the paper's tables
 
 
-def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
-    """Rods and hips (both legs share a force profile), then the body along z and x.
-
-    A force is looked for where it shows: of hips and body in flight, of rods off their stops.
-    """
-    y, rate, batch, legs = state.motion.y, state.motion.rate, state.batch, len(state.physics.legs)
-    flying = [(s.phase == "flight").astype(float) for s in state.schedules]
-    flight = batch.pad(flying, 0.0)[..., None] > 0.5
-    stopped = batch.pad([(s.low | s.high).astype(float) for s in state.schedules], 1.0)
-    off_stops = (stopped < 0.5) & batch.valid[..., None]
-
-    def channel(
-        name: str, unit: str, usual: float, ports: slice, where: Flags, values: dict[str, Array],
-        after: Mapping[str, str] = MappingProxyType({}),
-    ) -> ForceChannel:  # fmt: skip
-        places = range(*ports.indices(y.shape[-1]))
-        seen = {label: np.where(where, value, np.nan) for label, value in values.items()}
-        rises = {label: _after(state, command) for label, command in after.items()}
-        return ForceChannel(name, unit, usual, seen, _force_columns(state, places), rises)
-
-    rods, hips = slice(3 + legs, 3 + 2 * legs), slice(3, 3 + legs)
-    at_rods = {"speed [m/s]": rate[..., rods], "position [mm]": 1e3 * y[..., rods],
-               "air force [N]": air_forces(state)}  # fmt: skip
-    at_hips = {"speed [rad/s]": rate[..., hips], "angle [rad]": y[..., hips],
-               "torque [N.m]": batch.torque}  # fmt: skip
-    sent = {side: f"valve/{side}" for side in SIDES}
-    found = [
-        channel("rods", "N", ROD, rods, off_stops, at_rods, sent),
-        channel("hips", "N.m", HIP, hips, flight, at_hips, {"hip/tau": "hip/tau"}),
-    ]
-    for name, k in BODY.items():
-        own = slice(k, k + 1)
-        at = {"speed [m/s]": rate[..., own], "position [m]": y[..., own]}
-        found.append(channel(name, "N", USUAL_FORCE_BODY, own, flight, at))
-    return found
-
-
 def _after(state: LinearisedState, command: str) -> Array:
     """How much each leg's own command rose before every node, (n, L, legs, lags)."""
     batch, legs = state.batch, state.physics.legs
@@ -191,25 +143,6 @@ SPEED = 0.1  # speed over which friction at a hip turns round [rad.s-1]
 CREEPS = (0.003, 0.006, 0.012)  # travel over which a hysteresis turns round [m]
 RIPPLES = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of the hip
 ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
-
-
-def formula_columns(state: LinearisedState) -> dict[str, Array]:
-    """Columns (rows,) per unit of the coefficient, by the formula a model's YAML would hold."""
-    y, rate = state.motion.y, state.motion.rate
-    legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
-    hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
-    groups = (
-        (range(3 + legs, 3 + 2 * legs), "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
-        (range(3, 3 + legs), "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
-        ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
-        ([0], "body x", _drag_terms("x", rate[..., [0]])),
-    )
-    found: dict[str, Array] = {}
-    for channels, name, terms in groups:
-        listed = list(terms)
-        columns = _force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
-        found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
-    return found
 
 
 def _rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
@@ -266,36 +199,6 @@ STRENGTHS = {
 }
 
 
-def robot_missing(
-    state: LinearisedState, theta: Theta, strength: Array | None = None
-) -> list[MissingForce]:
-    """d(t) per run: force on the body [N], moments at pitch and hips [N.m], force on the rods [N].
-
-    `strength` (k,): 1 sigma of each channel's force; learnt when not given.
-    """
-    names = state.physics.channels
-    usual = (STRENGTHS["/".join(name.split("/")[-2:])] for name in names)
-    units, begin, least = zip(*usual, strict=True)
-    sigma = np.array(begin) if strength is None else strength
-    quiet = densities(state.physics, state.batch, state.schedules, QUIET)
-    y, g = state.measurement(theta), state.acceleration(theta)
-    valid, k = state.batch.valid, len(names)
-    for _ in range(ROUNDS if strength is None else 1):
-        system = _with_forces(state, quiet, sigma)
-        x, variance = smooth_with_band(system, gains(system), y, g)
-        power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
-        ratio = np.sqrt(power) / sigma
-        # towards nothing such rounds creep, so that their steps are doubled
-        used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
-    found = []
-    for i, log in enumerate(state.batch.resampled):
-        n = len(log.time)
-        force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
-        down = spans(log.time, state.schedules[i].phase != "flight")
-        found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
-    return found
-
-
 def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
     """The filter's system with a lagged force per channel, `sigma` (k,), as more states."""
     base = state.motion.system_with(density, state.batch.h)
@@ -304,3 +207,113 @@ def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System
     pushes = state.motion.channels[..., : len(sigma)]  # generalised force per channel force
     found.F[..., :d, d:] = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
     return found
+
+
+class RobotForces(Problem):
+    """What rows of robot logs are, and forces that may be missing; `state`: linearised logs."""
+
+    state: LinearisedState
+
+    def rows(self) -> Rows:
+        """What each row of `residual` is."""
+        return describe(self.state)
+
+    def commands(self) -> list[Changes]:
+        """Per run: command -> times and sizes of its changes."""
+        return [changes(log, self.state.physics.legs) for log in self.state.batch.resampled]
+
+    def operating_point(self) -> OperatingPoint:
+        """The piston of each row's leg along the motion; of the body's rows: the first leg's."""
+        state, legs, motion = self.state, self.state.physics.legs, self.state.motion
+        pistons = slice(motion.y.shape[-1] - len(legs), None)
+        place = (motion.y[..., pistons], motion.rate[..., pistons], air_forces(state))
+        per_leg = np.moveaxis(np.stack(place, axis=-1), 2, 0)  # (legs, n, L, 3)
+        owners = [channel.split("/")[0] for channel in _row_channels(state.physics)]
+        own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
+        x, v, force = state.pick(np.stack(own, axis=2)).T
+        return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
+
+    def force_channels(self) -> list[ForceChannel]:
+        """Rods and hips (both legs share a force profile), then the body along z and x.
+
+        A force is looked for where it shows: of hips and body in flight, of rods off their stops.
+        """
+        state, y, rate = self.state, self.state.motion.y, self.state.motion.rate
+        batch, legs = state.batch, len(state.physics.legs)
+        flying = [(s.phase == "flight").astype(float) for s in state.schedules]
+        flight = batch.pad(flying, 0.0)[..., None] > 0.5
+        stopped = batch.pad([(s.low | s.high).astype(float) for s in state.schedules], 1.0)
+        off_stops = (stopped < 0.5) & batch.valid[..., None]
+
+        def channel(
+            name: str, unit: str, usual: float, ports: slice, where: Flags,
+            values: dict[str, Array], after: Mapping[str, str] = MappingProxyType({}),
+        ) -> ForceChannel:  # fmt: skip
+            places = range(*ports.indices(y.shape[-1]))
+            seen = {label: np.where(where, value, np.nan) for label, value in values.items()}
+            rises = {label: _after(state, command) for label, command in after.items()}
+            return ForceChannel(name, unit, usual, seen, _force_columns(state, places), rises)
+
+        rods, hips = slice(3 + legs, 3 + 2 * legs), slice(3, 3 + legs)
+        at_rods = {"speed [m/s]": rate[..., rods], "position [mm]": 1e3 * y[..., rods],
+                   "air force [N]": air_forces(state)}  # fmt: skip
+        at_hips = {"speed [rad/s]": rate[..., hips], "angle [rad]": y[..., hips],
+                   "torque [N.m]": batch.torque}  # fmt: skip
+        sent = {side: f"valve/{side}" for side in SIDES}
+        found = [
+            channel("rods", "N", ROD, rods, off_stops, at_rods, sent),
+            channel("hips", "N.m", HIP, hips, flight, at_hips, {"hip/tau": "hip/tau"}),
+        ]
+        for name, k in BODY.items():
+            own = slice(k, k + 1)
+            at = {"speed [m/s]": rate[..., own], "position [m]": y[..., own]}
+            found.append(channel(name, "N", USUAL_FORCE_BODY, own, flight, at))
+        return found
+
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """d(t) per run: force on the body and the rods [N], moments at pitch and hips [N.m].
+
+        `strength` (k,): 1 sigma of each channel's force; learnt when not given.
+        """
+        state, theta, names = self.state, theta or {}, self.state.physics.channels
+        usual = (STRENGTHS["/".join(name.split("/")[-2:])] for name in names)
+        units, begin, least = zip(*usual, strict=True)
+        sigma = np.array(begin) if strength is None else strength
+        quiet = densities(state.physics, state.batch, state.schedules, QUIET)
+        y, g = state.measurement(theta), state.acceleration(theta)
+        valid, k = state.batch.valid, len(names)
+        for _ in range(ROUNDS if strength is None else 1):
+            system = _with_forces(state, quiet, sigma)
+            x, variance = smooth_with_band(system, gains(system), y, g)
+            power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
+            ratio = np.sqrt(power) / sigma
+            # towards nothing such rounds creep, so that their steps are doubled
+            used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
+        found = []
+        for i, log in enumerate(state.batch.resampled):
+            n = len(log.time)
+            force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
+            down = spans(log.time, state.schedules[i].phase != "flight")
+            found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
+        return found
+
+    def formulas(self, theta: Theta) -> dict[str, Array]:
+        """Simple terms on rods, hips and body: formula, as a model's YAML would hold it -> column
+        (n,), the same at every theta."""
+        state, y, rate = self.state, self.state.motion.y, self.state.motion.rate
+        legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
+        hips, rods = range(3, 3 + legs), range(3 + legs, 3 + 2 * legs)
+        groups = (
+            (rods, "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
+            (hips, "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
+            ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
+            ([0], "body x", _drag_terms("x", rate[..., [0]])),
+        )
+        found: dict[str, Array] = {}
+        for channels, name, terms in groups:
+            listed = list(terms)
+            columns = _force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
+            found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
+        return found

@@ -26,25 +26,9 @@ from kemba.identify.problem.structure import (
     free_figures,
     with_orifices,
 )
-from kemba.identify.problem.types import (
-    Array,
-    Candidate,
-    Changes,
-    ForceChannel,
-    MissingForce,
-    OperatingPoint,
-    Rows,
-    Theta,
-)
+from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
-from kemba.identify.robot.forces import (
-    changes,
-    describe,
-    formula_columns,
-    robot_force_channels,
-    robot_missing,
-    robot_operating_point,
-)
+from kemba.identify.robot.forces import RobotForces, describe
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
 from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.noise import (
@@ -56,7 +40,7 @@ from kemba.identify.robot.noise import (
 )
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
-from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
+from kemba.identify.robot.state import learnt_from, linearise_at
 from kemba.identify.robot.validate import contradictions, mixed_commands, slightly_mixed_up
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
@@ -65,7 +49,7 @@ WINDOW = 20  # rows over which one-step errors are summed
 PREDICTED = 0.05  # time of a prediction that tells an error in a channel's unit [s]
 
 
-class RobotProblem(Problem):
+class RobotProblem(RobotForces):
     """`Problem` for robot logs; see the text of `kemba.identify.robot.state`.
 
     `state`: the logs with the model linearised along their motion. `lengths`: those at which feet
@@ -76,7 +60,6 @@ class RobotProblem(Problem):
 
     moves = True
     learns_colour = True
-    state: LinearisedState
 
     def __init__(
         self,
@@ -234,10 +217,6 @@ class RobotProblem(Problem):
         """Whether residuals are linear in it: effects without memory, bias and scale of sensors."""
         return self._is_direct(name) or is_straight(name)
 
-    def rows(self) -> Rows:
-        """What each row of `residual` is."""
-        return describe(self.state)
-
     def expected_power(self) -> Array:
         """Mean square (n,) that each row would have if the model were right."""
         power = expected_power(self.state.motion.system, self.state.gain)
@@ -255,24 +234,6 @@ class RobotProblem(Problem):
             channel: errors[..., i][state.mask[..., i]]
             for i, channel in enumerate(self.physics.channels)
         }
-
-    def commands(self) -> Sequence[Changes]:
-        """Per run: command -> times and sizes of its changes."""
-        return [changes(log, self.physics.legs) for log in self.batch.resampled]
-
-    def operating_point(self) -> OperatingPoint:
-        """The piston of each row's leg; of the body's rows: the first leg's."""
-        return robot_operating_point(self.state)
-
-    def missing_force(
-        self, theta: Theta | None = None, strength: Array | None = None
-    ) -> list[MissingForce]:
-        """Forces on body and rods, moments at pitch and hips; `strength` (k,): 1 sigma each."""
-        return robot_missing(self.state, theta or {}, strength)
-
-    def force_channels(self) -> list[ForceChannel]:
-        """Where a force may be missing: on rods, hips and the body."""
-        return robot_force_channels(self.state)
 
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's, and what cannot be
@@ -314,10 +275,6 @@ class RobotProblem(Problem):
         """Columns (n, k) of every sensor fault and every length, per size."""
         faults = [c for c in self.candidates.values() if moves_readings(c.key)]
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
-
-    def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple terms on rods, hips and body: formula -> column (n,), the same at every theta."""
-        return formula_columns(self.state)
 
 
 def robot_problem(
