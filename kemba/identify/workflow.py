@@ -115,7 +115,10 @@ def discover_logs(
     fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
     found: Discovery | None = None
     try:
-        _check_disjoint(fitted, kept)
+        paths = ({Path(log.meta["path"]).resolve() for log in some} for some in (fitted, kept))
+        if both := set.intersection(*paths):
+            what = f"{sorted(both)[0].name} is also among the logs to be fitted"
+            raise KembaError("--holdout", what)
         fitted, kept, said = _kept_aside(fitted, kept)
         built = model_of(fitted, model)
         checked = check_all([*fitted, *kept], built)
@@ -293,13 +296,6 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
         path = write_model(out / "model.yaml", model, data["ranking"], answer.added, data)
         answer.model = data["model"] = str(path)
     write_json(out / "answer.json", data | {"base": reference(model)})
-
-
-def _check_disjoint(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
-    """A held-out log must not be fitted as well."""
-    paths = ({Path(log.meta["path"]).resolve() for log in logs} for logs in (fitted, kept))
-    if both := set.intersection(*paths):
-        raise KembaError("--holdout", f"{sorted(both)[0].name} is also among the logs to be fitted")
 
 
 PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")

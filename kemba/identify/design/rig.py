@@ -175,22 +175,16 @@ def course(point: Array, duration: float, stroke: float) -> CourseRig:
     every = duration / (laps * (count - 1))
     first, second = np.split(point[count:-1], 2)
     way = np.append(np.tile(point[: count - 1], laps), point[count - 1]) * stroke
-    places = _reachable(way, settings.fastest * every / STEEPEST)
+    reach, places = settings.fastest * every / STEEPEST, [float(way[0])]
+    for x in way[1:]:
+        places.append(float(np.clip(x, places[-1] - reach, places[-1] + reach)))
     return CourseRig(
         name="designed",
-        places=tuple(round(float(x), 5) for x in places),
+        places=tuple(round(x, 5) for x in places),
         every=every,
         extend=_spans(first, duration, pulses, settings.dwell),
         retract=_spans(second, duration, pulses, settings.dwell),
     )
-
-
-def _reachable(places: Array, reach: float) -> Array:
-    """Places (k,), each within `reach` of the one before."""
-    found = [float(places[0])]
-    for x in places[1:]:
-        found.append(float(np.clip(x, found[-1] - reach, found[-1] + reach)))
-    return np.array(found)
 
 
 def _spans(

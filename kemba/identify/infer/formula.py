@@ -114,8 +114,11 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not formulas:
         return None
     ranker, jacobian, names = extended(search, formulas)
-    chosen = _matters(search, _formula(ranker, names, _grow(ranker, names)))
-    alone = _formula(ranker, names, chosen)
+    alone = _formula(ranker, names, _grow(ranker, names))
+    parts = zip(alone.candidates, alone.terms, alone.coefficients, strict=True)
+    weight = {t: search.problem.weight(null.fit.theta, t) for t in alone.terms}
+    chosen = tuple(n for n, term, (c, _) in parts if abs(c) * weight[term] > MATTERS)
+    alone = _formula(ranker, names, chosen)  # without the imperfection that every model has
     catalogue = search.points[best].log_evidence - null.log_evidence
     if not chosen or alone.gain <= catalogue + by_chance(len(names)):
         return None
@@ -124,13 +127,6 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if alone.gain <= catalogue + test.threshold:
         return None
     return replace(alone, gain=alone.gain - catalogue, p_value=test.p_value(alone.gain))
-
-
-def _matters(search: Search, formula: Formula) -> Hypothesis:
-    """Those terms of a formula that are more than the imperfection that every model has."""
-    problem, theta = search.problem, search.points[NULL].fit.theta
-    parts = zip(formula.candidates, formula.terms, formula.coefficients, strict=True)
-    return tuple(n for n, term, (c, _) in parts if abs(c) * problem.weight(theta, term) > MATTERS)
 
 
 def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:

@@ -211,19 +211,15 @@ def _fitted(
     free = (*own, *_single_figures(problem), *starts)
     theta = {k: v for k, v in start.items() if k in keys or k in free}
     loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in RIG_FIGURES}
-    candidates = problem.candidates | {
-        name: _whole(problem.candidates[name]) for name in problem.structures & set(hypothesis)
-    }
+    candidates = dict(problem.candidates)
+    for name in problem.structures & set(hypothesis):  # whole, as the written model has it
+        lead = replace(candidates[name].lead, lower=1.0, upper=1.0)
+        candidates[name] = replace(candidates[name], lead=lead)
     for _ in range(ROUNDS):
         problem = copy(problem.coarser(theta))
         problem.nuisance, problem.candidates = problem.nuisance | loose, candidates
         theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
     return problem, own, theta
-
-
-def _whole(structure: Candidate) -> Candidate:
-    """Another structure as the model that is written has it: whole, not as a share."""
-    return replace(structure, lead=replace(structure.lead, lower=1.0, upper=1.0))
 
 
 def _judged(

@@ -15,7 +15,7 @@ from kemba.errors import KembaError
 from kemba.identify.infer.linear import Linear, estimate, moved, priors, usual_shapes
 from kemba.identify.infer.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Labels, Theta
+from kemba.identify.problem.types import Array, Labels, Theta
 
 
 class SmallEffectsSettings:
@@ -80,17 +80,10 @@ def _at(
 ) -> Mode:
     """The problem about theta, where the residual is r (n,)."""
     linear, jacobian, blocks = slopes
-    about = moved(linear, priors(problem, theta, linear.names)[0], jacobian, r, blocks)
-    return Mode(dict(theta), about, r, _cost_at(problem, hypothesis, theta, r, linear))
-
-
-def _cost_at(
-    problem: Problem, hypothesis: Hypothesis, theta: Theta, r: Array, linear: Linear
-) -> float:
-    """Half a sum of squares of the residual r (n,) at theta and of the hypothesis's priors."""
     z, mean, _ = priors(problem, theta, linear.names)
     pull = (z - mean) / _ranker(problem, linear).widths(hypothesis, 1.0)
-    return 0.5 * float(r @ r + pull @ pull)
+    cost = 0.5 * float(r @ r + pull @ pull)
+    return Mode(dict(theta), moved(linear, z, jacobian, r, blocks), r, cost)
 
 
 def _ranker(problem: Problem, linear: Linear, absent: Collection[str] = ()) -> Ranker:
@@ -104,14 +97,11 @@ def _possible(problem: Problem, hypothesis: Hypothesis, linear: Linear) -> dict[
     while True:
         z = _ranker(problem, linear, absent).score(hypothesis).z
         theta = estimate(problem, linear, z)
-        wrong = {n for n, c in free.items() if _impossible(c, theta) or n in problem.structures}
+        wrong = free.keys() & problem.structures
+        wrong |= {n for n, c in free.items()
+                  if not c.lead.signed and theta.get(c.key, c.lead.off) <= c.lead.off}  # fmt: skip
         if wrong <= absent:
             break
         absent |= wrong
     found = {k: v for k, v in theta.items() if k not in {free[n].key for n in absent}}
     return usual_shapes(free, found) | found
-
-
-def _impossible(candidate: Candidate, theta: Theta) -> bool:
-    lead = candidate.lead
-    return not lead.signed and theta.get(candidate.key, lead.off) <= lead.off

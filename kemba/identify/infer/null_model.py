@@ -200,16 +200,13 @@ class Baseline:
         """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
         r = self.problem.residual(fit.theta)
         linear, windowed = self.division.linear(fit.theta, names, slopes, r)
-        starts = [fit.theta] if self.problem.moves else [fit.theta, self._beside(fit.theta)]
+        starts = [fit.theta]
+        if not self.problem.moves:  # and with what the mode of nothing has a little of beside it
+            on, found = {key.rsplit(".", 1)[0] for key in fit.theta}, self.point.mode.theta.items()
+            starts.append({k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | fit.theta)
         mode = self._mode(hypothesis, starts, linear, slopes)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
-
-    def _beside(self, theta: Mapping[str, float]) -> dict[str, float]:
-        """Theta with what the mode of nothing has a little of beside its effects."""
-        on = {key.rsplit(".", 1)[0] for key in theta}
-        found = self.point.mode.theta.items()
-        return {k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | dict(theta)
 
     def _mode(
         self,

@@ -118,7 +118,9 @@ class _LeastSquares:
         at, slopes = self._slopes(x, r)
         gram, slope = self._normal_equations(x, r, at, slopes)
         for _ in range(settings.evaluations - 1):
-            step = _best_step(gram, slope, damping, lower - x, upper - x)
+            root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
+            within = lower - x, upper - x
+            step = lsq_linear(root.T, -np.linalg.solve(root, slope), within).x
             expected = -float(slope @ step + 0.5 * step @ gram @ step)
             if expected < settings.cost * _cost(x, r):
                 break
@@ -194,10 +196,3 @@ class _LeastSquares:
 
 def _cost(x: Array, r: Array) -> float:
     return 0.5 * float(r @ r + x @ x)
-
-
-def _best_step(gram: Array, slope: Array, damping: float, low: Array, high: Array) -> Array:
-    """The step (k,) between `low` and `high` by which the quadratic cost falls most."""
-    root = np.linalg.cholesky(gram + damping * np.diag(np.diag(gram)))
-    found = lsq_linear(root.T, -np.linalg.solve(root, slope), (low, high))
-    return np.asarray(found.x)

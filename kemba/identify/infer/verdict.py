@@ -67,7 +67,9 @@ def caveats_of(
         others = ", ".join(" + ".join(h) for h in selection.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    unsure = _unasked(search, best) if ended else ()
+    unsure = best if ended else ()  # smaller answers, and sensors that drift instead, come last
+    if len(best) == 1 or not search.late:
+        unsure = tuple(e for e in unsure if is_fault(e))
     if unsure and not reasons:
         return Caveats((ENDED,), part=True, unsure=unsure)
     return Caveats(tuple(reasons), part, unsure)
@@ -88,12 +90,6 @@ def _other_units(search: Search, best: Hypothesis) -> tuple[str, ...]:
         "its scale or offset in a map (--map)"
         for channel, what in gains.items()
     )
-
-
-def _unasked(search: Search, best: Hypothesis) -> Hypothesis:
-    """Effects of an ended search's answer that no smaller answer or drift was asked for."""
-    asked_smaller = len(best) == 1 or not search.late
-    return tuple(e for e in best if is_fault(e)) if asked_smaller else best
 
 
 def verdict_on(best: Hypothesis, formula: Formula | None, caveats: Caveats) -> Verdict:

@@ -198,18 +198,15 @@ def _turned(log: Trajectory) -> Trajectory:
 
 def _without_absurd(log: Trajectory) -> Trajectory:
     """The log without readings that no channel, or a few that this one cannot have."""
-    wild = {name: _wild(name, values) for name, values in log.items()}
-    broken = {name: np.where(wild[name], np.nan, log[name]) for name in wild if wild[name].any()}
-    return log.with_columns({f"{n} [{log.unit(n)}]": y for n, y in broken.items()})
-
-
-def _wild(name: str, y: Array) -> np.ndarray:
-    limits, known = GateSettings, range_of(name)
-    beyond = np.abs(y) > limits.absurd
-    if known is None:
-        return np.asarray(beyond)
-    outside = (y < known[0]) | (y > known[1])
-    return np.asarray(beyond | (outside & (outside.sum() <= limits.impossible * len(y))))
+    limits, broken = GateSettings, {}
+    for name, y in log.items():
+        wild = np.abs(y) > limits.absurd
+        if known := range_of(name):
+            outside = (y < known[0]) | (y > known[1])
+            wild |= outside & (outside.sum() <= limits.impossible * len(y))
+        if wild.any():
+            broken[f"{name} [{log.unit(name)}]"] = np.where(wild, np.nan, y)
+    return log.with_columns(broken)
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
@@ -225,17 +222,12 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
         raise KembaError("", "logs of several kinds cannot be fitted together", named)
-    _tell_apart(logs)
-    return logs
-
-
-def _tell_apart(logs: Sequence[Trajectory]) -> None:
-    """Logs of one name get their folder's name before it."""
     names = [log.meta["name"] for log in logs]
     for log in logs:
-        if names.count(log.meta["name"]) > 1:
+        if names.count(log.meta["name"]) > 1:  # logs of one name get their folder's before it
             path = Path(log.meta["path"]).resolve()
             log.meta["name"] = f"{path.parent.name}/{path.stem}"
+    return logs
 
 
 def legs_of(log: Trajectory) -> tuple[str, ...]:

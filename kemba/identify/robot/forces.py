@@ -7,6 +7,7 @@ the contact forces are unknown too, so only the force that they cannot explain i
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -30,6 +31,7 @@ from kemba.identify.problem.types import (
 )
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.filter import System, gains, smooth_with_band
+from kemba.identify.robot.linear import scatter
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import QUIET, PlaceSettings, densities
 from kemba.identify.robot.state import LinearisedState
@@ -201,11 +203,13 @@ STRENGTHS = {
 
 def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
     """The filter's system with a lagged force per channel, `sigma` (k,), as more states."""
-    base = state.motion.system_with(density, state.batch.h)
-    keep = np.where(state.batch.valid, np.exp(-state.batch.h / MEMORY), 1.0)
+    motion, h, k = state.motion, state.batch.h, state.motion.ref.q.shape[2]
+    base = replace(motion.system, W=motion.system.W.copy())
+    base.W[..., :k, :k] = scatter(motion.inverse @ motion.channels, density, h)
+    keep = np.where(state.batch.valid, np.exp(-h / MEMORY), 1.0)
     found, d = base.with_lags(keep[..., None], sigma), base.F.shape[-1]
-    pushes = state.motion.channels[..., : len(sigma)]  # generalised force per channel force
-    found.F[..., :d, d:] = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
+    pushes = motion.channels[..., : len(sigma)]  # generalised force per channel force
+    found.F[..., :d, d:] = base.G[..., : pushes.shape[2]] @ motion.inverse @ pushes
     return found
 
 

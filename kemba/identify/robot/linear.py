@@ -57,13 +57,6 @@ class LinearisedMotion:
         that the motion needs beyond model and contact."""
         return self.shift + self.response(force)
 
-    def system_with(self, density: Array, h: Array) -> System:
-        """The filter's system with other densities (n, L, c) of unknown force; `h` (n, L) [s]."""
-        k = self.ref.q.shape[2]
-        W = self.system.W.copy()
-        W[..., :k, :k] = scatter(self.inverse @ self.channels, density, h)
-        return replace(self.system, W=W)
-
     def with_noise(self, noise: Noise, batch: Batch) -> LinearisedMotion:
         """The same motion, read by sensors with this noise."""
         return replace(self, system=coloured(self.plain, noise, batch.sigma, batch.h))

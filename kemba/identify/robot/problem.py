@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from typing_extensions import Self
 
-from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
@@ -238,7 +237,12 @@ class RobotProblem(RobotForces):
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's, and what cannot be
         told where none stands. Raises BadData where a log contradicts itself or any model."""
-        if faults := self._faults():
+        faults = self.mixed  # columns by feet, then commands, then what no model explains
+        if not faults:
+            r, rows = self.residual(self.lengths), self.rows()
+            faults = list(mixed_commands(self.state, rows, r, self._left(self.physics)))
+            faults = faults or list(contradictions(self.state, rows, r, self._sensor_columns))
+        if faults:
             raise BadData(faults)
         zeros = (
             "wrong zeros of the height, the pitch, hips and pistons cannot be told from missing "
@@ -246,15 +250,6 @@ class RobotProblem(RobotForces):
         )
         all_fly = len(self.flights) == len(self.runs)
         return [f"no foot stands: {zeros}"] if all_fly else remarks(self.standing)
-
-    def _faults(self) -> list[KembaError]:
-        """What is wrong with the logs: columns by feet, then commands, then any model."""
-        if self.mixed:
-            return self.mixed
-        r, rows = self.residual(self.lengths), self.rows()
-        if faults := list(mixed_commands(self.state, rows, r, self._left(self.physics))):
-            return faults
-        return list(contradictions(self.state, rows, r, self._sensor_columns))
 
     def _left(self, physics: Physics) -> Left:
         """What the model leaves of other logs; everything of a motion that it cannot follow."""

@@ -346,7 +346,9 @@ def linearise_at(
     batch = batch.moved(rows)
     if first is None or rows.any():
         first = first_reference(physics, batch, p)
-    reference = _without_delays(batch, late - rows * dt, first)
+    rates = ((first.q, first.v), (first.v, first.a), (first.a, np.zeros_like(first.a)))
+    on_time = (ahead(a, rate, batch.resampled, late - rows * dt) for a, rate in rates)
+    reference = Reference(*on_time)  # as sensors that are not late would have seen it
     schedules = read_schedules(physics, batch, reference, p)
     for _ in range(ROUNDS):
         state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
@@ -361,12 +363,6 @@ def linearise_at(
     links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in links}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
-
-
-def _without_delays(batch: Batch, late: Array, ref: Reference) -> Reference:
-    """The reference as sensors that are not `late` (k,) [s] would have seen it."""
-    rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
-    return Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
 
 
 def _along(
