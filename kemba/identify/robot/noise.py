@@ -70,13 +70,13 @@ WIDTH = 21  # nodes over which the power is averaged; odd
 LEAST = 0.02  # smallest power
 
 
-def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
+def expected_power(system: System, gain: FilterGains) -> Array:
     """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
 
     It is below 1 where the filter allows for contact forces that a steady stance does not need.
     The draws are few, so that their power is averaged over some nodes.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     y = simulated(system, DRAWS, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
     padded = np.pad(power, ((WIDTH // 2, WIDTH // 2), (0, 0), (0, 0)), mode="edge")
