@@ -161,12 +161,6 @@ class RigCourseSettings:
 STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends at rest, by its mean
 
 
-def dimensions() -> int:
-    """Numbers that a course is made of: its places, twice the pulses of each valve, its laps."""
-    settings = RigCourseSettings
-    return settings.places + 4 * settings.pulses + 1
-
-
 def course(point: Array, duration: float, stroke: float) -> CourseRig:
     """The course of a point (k,) of the unit cube, which lasts `duration` [s]."""
     settings = RigCourseSettings
@@ -204,7 +198,7 @@ def beginnings(count: int, seed: int) -> Array:
     settings = RigCourseSettings
     plain = np.array(list(_plain(settings.places, settings.pulses)))
     more = max(count - len(plain), 1)
-    even = qmc.Sobol(dimensions(), rng=seed).random_base2(int(np.ceil(np.log2(more))))
+    even = qmc.Sobol(plain.shape[1], rng=seed).random_base2(int(np.ceil(np.log2(more))))
     return np.asarray(np.vstack([plain, even])[:count])
 
 
@@ -232,17 +226,13 @@ def _best_point(
     seen: list[tuple[float, Array]] = []
 
     def cost(point: Array) -> float:
-        over = bounded and time.monotonic() - started > settings.budget
-        if over and seen:
+        if seen and bounded and time.monotonic() - started > settings.budget:
             return 0.0
         value = worth(np.asarray(point))
         seen.append((value if np.isfinite(value) else 0.0, np.array(point)))
-        return -seen[-1][0]
-
-    def report(best: Array, convergence: float) -> bool:
         top = max(value for value, _ in seen)
         say(f"{len(seen)} tests tried; the best is worth {top:.2f}")
-        return bounded and time.monotonic() - started > settings.budget
+        return -seen[-1][0]
 
     differential_evolution(
         cost,
@@ -252,7 +242,6 @@ def _best_point(
         rng=np.random.default_rng(settings.seed),
         polish=False,
         tol=0.0,
-        callback=report,
     )
     return max(seen, key=lambda item: item[0])[1], len(seen)
 

@@ -8,12 +8,13 @@ times, and planning finds the torques.
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
 from kemba.config import dump_yaml
 from kemba.effects.mechanics.hip import Motor
@@ -168,9 +169,19 @@ def _design_motion(
     found: list[Tried] = []
     standard: Tried | None = None
     height = float(model.mechanism.standing["body/z"])
-    for sway in _sways(settings.tried, search.seed, height, lambda: found):
+    rng, even = np.random.default_rng(search.seed), max((2 * settings.tried) // 3, 1)
+    cube = qmc.Sobol(4, rng=search.seed).random_base2(int(np.ceil(np.log2(even))))
+    points = {STANDARD: np.full(4, 0.5)}
+    while count < settings.tried:  # the standard, some that fill the range, some near the best
         if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
             break
+        if count <= even:
+            point = cube[count - 1]
+        else:
+            near = points[found[0].test] if found else np.full(4, 0.5)
+            point = np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0)
+        sway = _sway(point, height) if count else STANDARD
+        points.setdefault(sway, point)
         count += 1
         tried = try_out(model, sway, rivals)
         if tried is None:
@@ -223,22 +234,6 @@ def safe(model: Model, done: Trajectory) -> bool:
     return True
 
 
-def _sways(count: int, seed: int, height: float, best: Callable[[], list[Tried]]) -> Iterator[Sway]:
-    """The standard sway, then some that fill the range evenly, then some near the best."""
-    from scipy.stats import qmc
-
-    rng = np.random.default_rng(seed)
-    even = max((2 * count) // 3, 1)
-    points = qmc.Sobol(4, rng=seed).random_base2(int(np.ceil(np.log2(even))))
-    yield STANDARD
-    for point in points[:even]:
-        yield _sway(point, height)
-    for _ in range(count - even - 1):
-        found = best()
-        near = _point(found[0].test) if found else np.full(4, 0.5)
-        yield _sway(np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0), height)
-
-
 def _sway(point: Array, height: float) -> Sway:
     """The sway of a point (4,) of the unit cube, its acceleration limited for hips at `height`."""
     s = SwaySettings
@@ -252,19 +247,6 @@ def _sway(point: Array, height: float) -> Sway:
     fastest = float(np.abs(np.gradient(rate, plain.duration / 499)).max())
     angle = s.least * (s.most / s.least) ** float(point[0])
     return replace(plain, angle=round(min(angle, s.acceleration / (height * fastest)), 4))
-
-
-def _point(sway: Sway) -> Array:
-    """The point (4,) of a sway, in the middle of its number of leans."""
-    s = SwaySettings
-    return np.array(
-        [
-            np.log(sway.angle / s.least) / np.log(s.most / s.least),
-            (sway.leans - 0.5) / s.leans,
-            (sway.duration - s.shortest) / (s.longest - s.shortest),
-            0.5 + 0.5 * np.log(sway.pace) / np.log(s.pace),
-        ]
-    )
 
 
 @dataclass(frozen=True)
