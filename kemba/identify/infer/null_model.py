@@ -1,7 +1,7 @@
 """The problem linearised at refitted hypotheses, the model as it is first: its fit, the colour of
 the noise, and the linear evidence of every effect."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -152,7 +152,8 @@ class Baseline:
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
-        self._learn_noise(theta, keep=False)
+        blocks = self.division.blocks
+        self.problem = with_learnt_colour(self.problem, theta, blocks, careful=True)
         self._rank(self.point.fit.theta)
 
     def _start(self) -> None:
@@ -172,7 +173,12 @@ class Baseline:
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
             theta = estimate(problem, linear, linear.best())
-        self._rank(theta, known if moving else self._learn_noise(theta, keep=True))
+        # where the motion moves, the search learns the colour with it
+        if not moving and problem.learns_colour:
+            self.problem, plain = learnt_colour(problem, theta, blocks, careful=False)
+            self._rank(theta, self.problem.whiten(plain))
+        else:
+            self._rank(theta, known if moving else None)
 
     def _rank(self, theta: Mapping[str, float], jacobian: Array | None = None) -> None:
         """Linearise at theta, and score every hypothesis there."""
@@ -190,7 +196,7 @@ class Baseline:
         names = names or self.point.linear.names
         linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        mode = self._mode(NULL, [theta], linear, self.jacobian)
+        mode = mode_of(self.problem, NULL, [theta], linear, self.jacobian, self.division.blocks)
         score = self.ranker(mode.linear).score(NULL)
         self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
 
@@ -204,27 +210,7 @@ class Baseline:
         if not self.problem.moves:  # and with what the mode of nothing has a little of beside it
             on, found = {key.rsplit(".", 1)[0] for key in fit.theta}, self.point.mode.theta.items()
             starts.append({k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | fit.theta)
-        mode = self._mode(hypothesis, starts, linear, slopes)
+        blocks = self.division.blocks
+        mode = mode_of(self.problem, hypothesis, starts, linear, slopes, blocks)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
-
-    def _mode(
-        self,
-        hypothesis: Hypothesis,
-        starts: Iterable[Mapping[str, float]],
-        linear: Linear,
-        slopes: Array,
-    ) -> Mode:
-        """The mode of a hypothesis from the best of these starts."""
-        return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
-
-    def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
-        """Learn the colour beside all effects; the Jacobian under it if wanted (`keep`)."""
-        if not self.problem.learns_colour or self.problem.moves:
-            return None  # where the motion moves, the search learns the colour with it
-        blocks = self.division.blocks
-        if not keep:
-            self.problem = with_learnt_colour(self.problem, theta, blocks, careful=True)
-            return None
-        self.problem, jacobian = learnt_colour(self.problem, theta, blocks, careful=False)
-        return self.problem.whiten(jacobian)

@@ -1,6 +1,5 @@
 """The effects in order of probability, with their parameters and their equivalents."""
 
-from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -33,9 +32,11 @@ def ranked(
     """The effects in order of probability; those of the selected hypothesis first, then the
     others of the `whole` that is written, with what the `joint` fit says of them."""
     problem, best = search.problem, selection.best
-    probability = (
-        search.probabilities(selection.dismissed) if best else _doubted(search.probabilities())
-    )
+    probability = search.probabilities(selection.dismissed if best else ())
+    if not best:  # where nothing was found significant, nothing is the likeliest
+        rest = sum(p for h, p in probability.items() if h)
+        scale = min(1.0, DOUBTED / rest) if rest > 0 else 1.0
+        probability = {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
     shares = share_of(probability, problem.candidates)
     order = sorted(
         shares,
@@ -49,19 +50,13 @@ def ranked(
         hypothesis = hypothesis or _likeliest_with(search, effect)
         if not hypothesis:
             continue
-        found.append(
-            Ranked(
-                effect,
-                shares[effect],
-                joint.values(problem.candidates[effect])
-                if joint is not None and written
-                else values(search, hypothesis, effect),
-                equivalents(search, selection, effect) if effect in best else (),
-                before,
-                error(search, hypothesis, kept),
-                left_out(search, hypothesis).nats,
-            )
-        )
+        if joint is not None and written:
+            told = joint.values(problem.candidates[effect])
+        else:
+            told = values(search, hypothesis, effect)
+        alike = equivalents(search, selection, effect) if effect in best else ()
+        after, gain = error(search, hypothesis, kept), left_out(search, hypothesis).nats
+        found.append(Ranked(effect, shares[effect], told, alike, before, after, gain))
     return found
 
 
@@ -71,13 +66,6 @@ def _likeliest_with(search: Search, effect: str) -> Hypothesis:
         return (effect,)
     having = [h for h in search.points if effect in h]
     return max(having, key=lambda h: search.points[h].log_evidence, default=NULL)
-
-
-def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
-    """Where nothing was found significant, nothing is the likeliest."""
-    rest = sum(p for h, p in probability.items() if h)
-    scale = min(1.0, DOUBTED / rest) if rest > 0 else 1.0
-    return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
 
 
 def equivalents(search: Search, selection: Selection, effect: str) -> tuple[str, ...]:

@@ -228,10 +228,9 @@ def _candidate(
     settings = CandidateSettings
     (lead, off), *_ = effect.off.items()
     param = declared[lead]
-    # a time constant far below the sampling interval is the same as none
-    lower = (
-        max(param.lower, settings.fastest) if param.unit == "s" and param.lower > 0 else param.lower
-    )
+    lower = param.lower
+    if param.unit == "s" and lower > 0:  # far below the sampling interval it is the same as none
+        lower = max(lower, settings.fastest)
     switch = Parameter(lead, param.unit, off, param.size, lower, param.upper)
     shapes = []
     for other in (n for n in declared if n != lead):

@@ -83,14 +83,16 @@ class RigFit:
 
 def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     """Fit all figures that the model lists and that show. Raises KembaError."""
-    started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
+    effects = []
+    for effect in model.effects:  # a switch that stands at off starts at its usual size
+        sizes = effect.parameters()
+        off = {n: v + sizes[n].size for n, v in effect.off.items() if effect.value(n) == v}
+        effects.append(effect.bind(off) if off and effect.moves else effect)
+    started = Model(model.mechanism, effects, model.supply, model.name)
+    brought = {name.split(".")[0] for name in RIG_FIGURES}  # of these only the figures named
+    values = {name: value for name, (_, value) in started.parameters.items()}
     names = [
-        name
-        for name, (_, value) in started.parameters.items()
-        if value
-        and (
-            name in RIG_FIGURES or name.split(".")[0] not in {t.split(".")[0] for t in RIG_FIGURES}
-        )
+        n for n in values if values[n] and (n in RIG_FIGURES or n.split(".")[0] not in brought)
     ]
     make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
@@ -108,13 +110,6 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     return _fit(problem, names, values, model, rms(before.residual({})))
 
 
-def _started(effect: Effect) -> Effect:
-    """The effect with its switch at the usual size where it stands at off."""
-    sizes = effect.parameters()
-    off = {n: v + sizes[n].size for n, v in effect.off.items() if effect.value(n) == v}
-    return effect.bind(off) if off and effect.moves else effect
-
-
 def _fit(
     problem: Problem, names: list[str], values: Mapping[str, float], model: Model, before: float
 ) -> RigFit:
@@ -129,14 +124,8 @@ def _fit(
         return np.concatenate([problem.residual(theta), known * x])
 
     lower, upper = _bounds(model, names, values, len(starts))
-    found = least_squares(
-        residual,
-        np.zeros(len(free)),
-        bounds=(lower, upper),
-        x_scale="jac",
-        diff_step=STEP,
-        method="trf",
-    )
+    start, bounds = np.zeros(len(free)), (lower, upper)
+    found = least_squares(residual, start, bounds=bounds, x_scale="jac", diff_step=STEP)
     rows = len(problem.rows())
     j, r = found.jac[:rows], found.fun[:rows]
     scale = np.maximum(np.linalg.norm(j, axis=0), 1e-300)
