@@ -103,7 +103,7 @@ RULES = [
     Rule("swaps", SEARCH + "_swap", lambda s, best: best, _differs),
     Rule("followed twice", "infer.search:SearchSettings", values={"followed": 1}),
     Rule("colour anew", "infer.null_model:Baseline.seen_from", lambda b, theta: None, always),
-    Rule("drifting sensors", "infer.colour:_with_drift", lambda p, theta: p,
+    Rule("drifting sensors", "infer.null_model:_with_drift", lambda p, theta: p,
          lambda result, p, theta: result is not p),
     Rule("spikes", "problem.noise:caution", lambda r: None,
          lambda result, r: bool(np.any(result < 1.0))),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.mechanism import Cylinder, load_cylinder
 from kemba.plant.published import PAPER_FORCE, PAPER_RISE
 

@@ -31,7 +31,7 @@ from kemba.identify.infer.linear import time_blocks
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import left_out_noise
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.workflow import admitted, model_of
 
 SEED = 9_000

@@ -13,8 +13,7 @@ from kemba.identify.discover import what_shows
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import Identifiability, null_test
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Parameter
+from kemba.identify.problem.problem import Parameter, Problem
 from kemba.identify.workflow import posed
 from kemba.logs import load_map
 from kemba.model import load_model

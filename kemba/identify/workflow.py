@@ -15,12 +15,11 @@ from kemba.identify.adopt import COVARIANCE, reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.discover import Discovery, discover
-from kemba.identify.infer.colour import with_learnt_colour
+from kemba.identify.infer.null_model import with_learnt_colour
 from kemba.identify.infer.windows import error_ratio, free_starts
 from kemba.identify.logs.gate import BadData, check_logs, limits_of, sentence
 from kemba.identify.logs.reading import excerpts, read_logs, taken_on
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array, Problem
 from kemba.logs import load_map
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Model, build_model, load_model, load_spec

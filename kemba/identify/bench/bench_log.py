@@ -17,6 +17,7 @@ from kemba.identify.logs.gate import ROW
 from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.logs.reading import held
 from kemba.identify.problem.noise import difference_sigma, telling
+from kemba.identify.problem.problem import Array, Flags
 from kemba.identify.problem.sensor_noise import (
     ChannelNoise,
     ColourSettings,
@@ -26,7 +27,6 @@ from kemba.identify.problem.sensor_noise import (
     pairs,
     weighted,
 )
-from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
 # How the velocity of an imposed motion is found.

@@ -14,8 +14,7 @@ from scipy.optimize import minimize_scalar
 from kemba.identify.bench.bench_log import BenchLog, SmoothedMotion
 from kemba.identify.infer.linear import condense, names_of, priors
 from kemba.identify.logs.reading import GateSettings
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Problem, Theta
 from kemba.trajectory import Trajectory
 
 COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta

@@ -14,8 +14,8 @@ from kemba.effects.series import Series
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog, Pulses, SmoothedMotion
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
 from kemba.identify.problem.candidates import CompiledModels, nominal_figures
+from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults
-from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.mechanism import Cylinder
 from kemba.model.model import Model
 from kemba.model.rest import Buffered, StatesAlong

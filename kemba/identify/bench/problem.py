@@ -27,7 +27,7 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
 from kemba.identify.problem.missing_force import dahl, end_terms, missing_along
 from kemba.identify.problem.noise import ColouredProblem, colours, whiten
-from kemba.identify.problem.types import (
+from kemba.identify.problem.problem import (
     Array,
     Changes,
     ForceChannel,

@@ -12,7 +12,7 @@ from kemba.effects.pneumatics.switching import Pulse, inverted
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog, SmoothedMotion
 from kemba.identify.infer.windows import rms
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 BETTER = 4.0  # factor by which a mix-up must fit better

@@ -20,8 +20,7 @@ from kemba.identify.compare.hints import (
 from kemba.identify.compare.words import place_of
 from kemba.identify.infer.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.missing_force import Peak, peaks
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, MissingForce, Rows, Texts, Theta
+from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.units import short
 
 FAIR = 1.5  # error ratio below which it nearly explains them

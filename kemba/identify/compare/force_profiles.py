@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, ForceChannel
+from kemba.identify.problem.problem import Array, ForceChannel, Problem
 from kemba.units import short
 
 

@@ -18,8 +18,7 @@ from kemba.identify.compare.force_profiles import (
 from kemba.identify.compare.words import command, quantity
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 from kemba.identify.infer.windows import codes
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Labels, Rows, Theta
+from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Rows, Theta
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from kemba.identify.design.separation import (
     strength,
 )
 from kemba.identify.problem.noise import Colour, learn
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.rigs import CourseRig, DynamometerRig, LockedRig, RandomRig, Rig, Test

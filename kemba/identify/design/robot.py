@@ -31,7 +31,7 @@ from kemba.identify.design.separation import (
     separation,
     strength,
 )
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.model import Model
 from kemba.model.spec import load_model

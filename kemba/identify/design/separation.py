@@ -17,8 +17,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.infer.linear import is_shape, priors
 from kemba.identify.infer.refit import Frozen, refit
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.problem import Array, Problem, Theta
 
 
 class ExperimentSettings:

@@ -1,6 +1,6 @@
 """Which effects explain the data: the search, its validation, and the verdict.
 
-1. `null_model`, `colour`: the model as it is is fitted, and the noise learnt beside a model in
+1. `null_model`: the model as it is is fitted, and the colour of the noise learnt beside a model in
    which every effect may help, so that a missing effect does not pass for noise.
 2. `linear`, `spike_slab`, `mode`: residuals linearised there give the evidence of "these effects
    are large, all others small" for every hypothesis, by matrices of the size of the parameters.

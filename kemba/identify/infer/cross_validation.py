@@ -16,8 +16,7 @@ from kemba.identify.infer.null_model import LinearisationPoint, effect_bounds
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import START, error_ratio
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Labels, Theta
+from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
 
 class CrossValidationSettings:

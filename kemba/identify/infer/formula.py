@@ -10,8 +10,7 @@ from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import BootstrapSettings, bootstrap, redrawn_noise
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.noise import drift_waves
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Parameter
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem
 
 
 def drift_columns(problem: Problem) -> tuple[Array, Array]:

@@ -8,8 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Flags, Labels, Parameter, Theta
+from kemba.identify.problem.problem import (
+    Array,
+    Candidate,
+    Flags,
+    Labels,
+    Parameter,
+    Problem,
+    Theta,
+)
 
 
 class LinearSettings:

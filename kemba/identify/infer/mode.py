@@ -14,8 +14,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.infer.linear import Linear, estimate, moved, priors, usual_shapes
 from kemba.identify.infer.spike_slab import Hypothesis, Ranker
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Labels, Theta
+from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
 
 class SmallEffectsSettings:

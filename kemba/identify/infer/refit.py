@@ -10,8 +10,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
-from kemba.identify.problem.problem import Problem, bounded
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array, Problem, bounded
 
 
 class RefitSettings:

@@ -14,7 +14,7 @@ from kemba.identify.compare.words import place_of
 from kemba.identify.infer.cross_validation import within_tolerance
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, SpikeSlabSettings
-from kemba.identify.problem.types import Array, Labels
+from kemba.identify.problem.problem import Array, Labels
 from kemba.units import short
 
 # When a parameter differs from run to run.

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.identify.infer.colour import with_learnt_colour
 from kemba.identify.infer.linear import estimate, names_of
-from kemba.identify.infer.null_model import Baseline, LinearisationPoint
+from kemba.identify.infer.null_model import Baseline, LinearisationPoint, with_learnt_colour
 from kemba.identify.infer.refit import Fit, Frozen, refit
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior, probabilities
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Problem, Theta
 from kemba.stopwatch import Stage
 
 

@@ -20,7 +20,7 @@ from kemba.identify.answer import DiscoverSettings
 from kemba.identify.infer.linear import Linear, precision_factor, time_blocks
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Ranker, SpikeSlabSettings
-from kemba.identify.problem.types import Array, Labels
+from kemba.identify.problem.problem import Array, Labels
 
 
 class BootstrapSettings:

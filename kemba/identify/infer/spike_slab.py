@@ -10,7 +10,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.infer.linear import Linear, precision_factor
 from kemba.identify.infer.windows import START
-from kemba.identify.problem.types import Array, Candidate, Labels
+from kemba.identify.problem.problem import Array, Candidate, Labels
 
 
 class SpikeSlabSettings:

@@ -6,6 +6,7 @@ from typing import Generic, TypeVar
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
+from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
 from kemba.identify.problem.structure import (
     LINE,
@@ -15,7 +16,6 @@ from kemba.identify.problem.structure import (
     line_candidates,
     structure_candidates,
 )
-from kemba.identify.problem.types import Candidate, Parameter, Theta
 from kemba.model.evaluation import port_name
 from kemba.model.model import Model
 from kemba.quantity import Param

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.events import runs
-from kemba.identify.problem.types import Array, MissingForce
+from kemba.identify.problem.problem import Array, MissingForce
 
 MEMORY = 0.025  # correlation time of the missing force [s]
 ROUNDS = 20  # rounds in which its strength is learnt

@@ -18,9 +18,8 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from typing_extensions import Self
 
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Array, Flags, Labels, Problem, Rows
 from kemba.identify.problem.sensor_noise import ColourSettings
-from kemba.identify.problem.types import Array, Flags, Labels, Rows
 
 # How the step of a sensor is found.
 # readings closer than this share of their range are one reading: conversion of units rounds in

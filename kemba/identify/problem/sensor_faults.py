@@ -6,7 +6,7 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import REMEASURED, Effect
 from kemba.effects.sensors import SensorEffect, as_measured, as_true
 from kemba.effects.series import Series
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Theta
 
 GEOMETRY = "geometry:"  # names of the lengths begin so
 

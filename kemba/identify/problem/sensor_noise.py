@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from kemba.effects.base import At, Contribution
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.effects.pneumatics.supply import SupplyLine
-from kemba.identify.problem.types import Candidate, Parameter
+from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.quantity import Param, Quantity, Tolerance
 

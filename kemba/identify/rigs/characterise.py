@@ -19,8 +19,7 @@ from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divi
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import excerpts, read_logs, taken_on
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
 from kemba.logs import load_map, log_files
@@ -90,10 +89,8 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
         effects.append(effect.bind(off) if off and effect.moves else effect)
     started = Model(model.mechanism, effects, model.supply, model.name)
     brought = {name.split(".")[0] for name in RIG_FIGURES}  # of these only the figures named
-    values = {name: value for name, (_, value) in started.parameters.items()}
-    names = [
-        n for n in values if values[n] and (n in RIG_FIGURES or n.split(".")[0] not in brought)
-    ]
+    listed = [name for name, (_, value) in started.parameters.items() if value]
+    names = [n for n in listed if n in RIG_FIGURES or n.split(".")[0] not in brought]
     make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]

@@ -22,8 +22,7 @@ from kemba.identify.problem.candidates import (
 )
 from kemba.identify.problem.missing_force import missing_along
 from kemba.identify.problem.noise import ColouredProblem, whiten
-from kemba.identify.problem.sensor_faults import is_straight
-from kemba.identify.problem.types import (
+from kemba.identify.problem.problem import (
     Array,
     Candidate,
     Flags,
@@ -34,6 +33,7 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
+from kemba.identify.problem.sensor_faults import is_straight
 from kemba.identify.rigs.prediction import Predictor
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog, prepare
 from kemba.identify.rigs.validate import contradictions

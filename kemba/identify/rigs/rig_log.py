@@ -17,7 +17,7 @@ from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.missing_force import dahl
 from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 

@@ -8,9 +8,8 @@ import numpy as np
 from kemba.effects.series import Series
 from kemba.identify.infer.refit import RefitSettings
 from kemba.identify.problem.candidates import CompiledModels, nominal_figures, sensor_candidates
-from kemba.identify.problem.problem import Problem, bounded
+from kemba.identify.problem.problem import Array, Problem, Rows, Theta, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
-from kemba.identify.problem.types import Array, Rows, Theta
 from kemba.identify.rigs.problem import standing_candidates
 from kemba.model.model import Model
 from kemba.model.rest import StatesAlong

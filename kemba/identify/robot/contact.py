@@ -15,7 +15,7 @@ from scipy.ndimage import (
 )
 
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 
 # When a foot touches the ground, and when a piston rests at a stop.
 # height below which a foot may touch [m]: a piston 0.5 mm wrong lifts the foot by 3 mm, a late

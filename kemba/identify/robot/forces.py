@@ -17,14 +17,14 @@ from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.problem.missing_force import dahl, end_terms, spans
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import (
+from kemba.identify.problem.problem import (
     Array,
     Changes,
     Flags,
     ForceChannel,
     MissingForce,
     OperatingPoint,
+    Problem,
     Rows,
     Texts,
     Theta,

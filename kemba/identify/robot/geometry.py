@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
+from kemba.identify.problem.problem import Array, Candidate, Flags
 from kemba.identify.problem.sensor_faults import GEOMETRY
-from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
 from kemba.identify.robot.physics import Physics, SampleMap

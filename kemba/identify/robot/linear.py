@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 from kemba.identify.robot.batch import Batch, travelled
 from kemba.identify.robot.contact import ContactSchedule, steady, steady_while
 from kemba.identify.robot.filter import FilterGains, System, smooth

@@ -23,7 +23,7 @@ from kemba.effects.pneumatics.switching import inverted
 from kemba.effects.sensors import SensorBias, SensorScale
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.problem import Array, Theta
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.physics import Physics
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kemba.identify.problem.problem import Array
 from kemba.identify.problem.sensor_noise import (
     ChannelNoise,
     ColourSettings,
@@ -22,7 +23,6 @@ from kemba.identify.problem.sensor_noise import (
     pairs,
     weighted,
 )
-from kemba.identify.problem.types import Array
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.filter import FilterGains, System, innovations
 

@@ -13,7 +13,7 @@ from kemba.identify.problem.candidates import (
     nominal_figures,
     without_delay,
 )
-from kemba.identify.problem.types import Array, Flags, Theta
+from kemba.identify.problem.problem import Array, Flags, Theta
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model

@@ -16,7 +16,7 @@ from kemba.identify.problem.candidates import (
     robot_candidates,
     sensor_candidates,
 )
-from kemba.identify.problem.problem import Problem, mean_slope
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
 from kemba.identify.problem.structure import (
     FIGURES,
@@ -25,7 +25,6 @@ from kemba.identify.problem.structure import (
     free_figures,
     with_orifices,
 )
-from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
 from kemba.identify.robot.forces import RobotForces, describe
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import ContactSchedule, read_schedule
 from kemba.identify.robot.filter import System, gains, smooth

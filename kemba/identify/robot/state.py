@@ -18,9 +18,9 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.problem.candidates import GRIP, SOFTNESS
+from kemba.identify.problem.problem import Array, Flags, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.identify.problem.types import Array, Flags, Theta
 from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole_rows
 from kemba.identify.robot.contact import ContactSchedule, loaded
 from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations

@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
-from kemba.identify.problem.types import Array, Flags, Rows
+from kemba.identify.problem.problem import Array, Flags, Rows
 from kemba.identify.robot.batch import Batch, ResampledLog
 from kemba.identify.robot.mix_ups import (
     SAME,

@@ -15,7 +15,7 @@ from kemba.identify.compare.bins import (
 from kemba.identify.compare.hints import Slopes, within_tolerance
 from kemba.identify.infer.significance import NullTest
 from kemba.identify.infer.windows import Windows, changes, rms
-from kemba.identify.problem.types import Rows
+from kemba.identify.problem.problem import Rows
 
 
 def binned(errors: list[np.ndarray]) -> list[ConditionBin]:
