@@ -115,19 +115,21 @@ def _colour(rows: float) -> Colour:
 
 def _menu(stroke: float) -> list[Rig]:
     """Standard tests of one piston of this stroke [m]."""
-    modes = ("extend", "retract", "both", "none")
-    slow = DynamometerRig.model_validate(
-        {"name": "slow_stroke", "speeds": {m: [0.02, 0.05] for m in modes}}
-    )
-    fast = DynamometerRig.model_validate(
-        {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
-    )
-    both_ends = {"positions": [0.0, stroke / 2, stroke]}
+    modes, ends = ("extend", "retract", "both", "none"), [0.0, stroke / 2, stroke]
+
+    def locked(chamber: str) -> Rig:
+        asked = {"name": f"locked_{chamber}", "chamber": chamber, "positions": ends}
+        return LockedRig.model_validate(asked)
+
+    def strokes(name: str, *speeds: float) -> Rig:
+        asked = {"name": name, "speeds": {mode: list(speeds) for mode in modes}}
+        return DynamometerRig.model_validate(asked)
+
     return [
-        LockedRig.model_validate({"name": "locked_extend", "chamber": "extend", **both_ends}),
-        LockedRig.model_validate({"name": "locked_retract", "chamber": "retract", **both_ends}),
-        slow,
-        fast,
+        locked("extend"),
+        locked("retract"),
+        strokes("slow_stroke", 0.02, 0.05),
+        strokes("dynamometer", 0.1, 0.3, 0.6, 1.0),
         RandomRig.model_validate({"name": "random", "duration": 4.0}),
         RandomRig.model_validate({"name": "random_fast", "duration": 4.0, "speed": 1.2}),
     ]

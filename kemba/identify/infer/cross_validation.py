@@ -213,8 +213,8 @@ def error(search: Search, hypothesis: Hypothesis, kept: HeldOut | None) -> float
 def error_as_it_is(search: Search, kept: HeldOut | None = None) -> float:
     """Error of the model as it is along the motion that it makes of the data itself, as `compare`
     tells it; without logs `kept` of the fitted ones."""
-    own = search.own or (search.problem, search.points[NULL].fit.theta)
-    return _ratio(search, kept.plain if kept else own[0].with_noise_of(search.problem), own[1])
+    problem, theta = search.own or (search.problem, search.points[NULL].fit.theta)
+    return _ratio(search, kept.plain if kept else problem.with_noise_of(search.problem), theta)
 
 
 def _ratio(search: Search, judge: Problem, theta: Theta) -> float:

@@ -114,8 +114,8 @@ class Standing:
 
     def heights(self, x: Array) -> tuple[Array, Array]:
         """Heights (n, legs) [m] of the feet, and their slopes (n, legs, k)."""
-        z, slopes = self._map(self.samples, x)
-        return z, slopes
+        heights, slopes = self._map(self.samples, x)
+        return heights, slopes
 
 
 def standing_lengths(
@@ -136,12 +136,12 @@ def standing_lengths(
     free = np.array([*lengths, *zeros, LONGER])
     width = np.array([*lengths, *zeros, LONGER * HELD])
     start = np.zeros(len(width))
-    most = _most_rows(standing.heights(start)[0])
+    most = len(_crowd(standing.heights(start)[0]))
     for i, size in enumerate(sizes.values()):
         for share in TRIED:
             trial = np.zeros(len(width))
             trial[i] = share * size
-            count = _most_rows(standing.heights(trial)[0])
+            count = len(_crowd(standing.heights(trial)[0]))
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
@@ -193,11 +193,6 @@ def _only(
     narrow[: len(held)][held] *= HELD
     begin[: len(held)][held] = 0.0
     return _refined(standing, begin, narrow, rows)
-
-
-def _most_rows(heights: Array) -> int:
-    """The most samples at one height near that of the ground."""
-    return len(_crowd(heights))
 
 
 def _crowd(heights: Array) -> Array:
