@@ -221,6 +221,7 @@ LEARNING = (
     "in_detail",
 )
 PREDICTING = ("residual", "residuals", "jacobian")
+WITHIN = {"spikes"}  # rules within what problems learn, which is then remembered by itself
 
 
 def _key(value: Any) -> Any:
@@ -234,15 +235,18 @@ def _key(value: Any) -> Any:
 
 
 @contextmanager
-def remembered() -> Iterator[None]:
-    """Within this block problems remember what they predicted and learnt."""
+def remembered() -> Iterator[list[str]]:
+    """Within this block problems remember what they predicted and learnt; what they learnt, apart
+    for each content of the list."""
     known: dict[Any, Any] = {}
+    apart: list[str] = []
     alive: list[Any] = []
 
     def remember(name: str, original: Callable[..., Any]) -> Callable[..., Any]:
         def call(self: Any, *args: Any, **kwargs: Any) -> Any:
             given = [list(a) if hasattr(a, "__next__") else a for a in args]
-            key = id(self), name, _key(given), _key(kwargs)
+            learns = name.rpartition(".")[2] in LEARNING
+            key = id(self), name, _key(given), _key(kwargs), tuple(apart if learns else ())
             if key not in known:
                 alive.extend([self, *given])
                 known[key] = original(self, *given, **kwargs)
@@ -269,7 +273,7 @@ def remembered() -> Iterator[None]:
             for name in (*LEARNING, *PREDICTING):
                 new = remember(f"{cls.__name__}.{name}", getattr(cls, name))
                 stack.enter_context(patch.object(cls, name, new))
-        yield
+        yield apart
 
 
 def unjudged(problem: Any, hypothesis: Any, theta: Any) -> JointFit:
@@ -357,7 +361,7 @@ def run(study: str, index: int, setting: Record, groups: list[str], out: Path) -
         said = " + ".join(found.get("named", ())) or found.get("verdict", "failed")
         print(f"{study} {index} without {name or 'nothing'}: {said}", flush=True)
 
-    with remembered():
+    with remembered() as apart:
         acted: set[str] = set()
         if (study, index, "") not in done or not groups:
             with watched(acted):
@@ -367,9 +371,11 @@ def run(study: str, index: int, setting: Record, groups: list[str], out: Path) -
         for name in wanted or [r.name for r in RULES if r.name in acted]:
             if (study, index, name) in done:
                 continue
+            rules = [one.strip() for one in name.split(",")]
+            apart[:] = sorted(WITHIN & set(rules))
             with ExitStack() as stack:
-                for one in name.split(","):
-                    stack.enter_context(without(BY_NAME[one.strip()]))
+                for one in rules:
+                    stack.enter_context(without(BY_NAME[one]))
                 keep(name, answered(problem, setting, truth))
     if not groups:
         report.append(out, {"study": study, "index": index, "without": "end"})
