@@ -55,11 +55,18 @@ def _measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
     apex = [float(np.nanmax(log["body/z"])) for log in body]
     speed = [float(np.nanmax(_speed(log))) for log in body]
     supply = (spec.supply, spec.supply) if spec.supply else None
-    modes = tuple(sorted({mode for log in logs for mode in _modes(log)}))
+    modes: set[str] = set()  # of a leg's valves: extend, then retract
+    for log in logs:
+        for name in log.names:
+            leg, extend, _ = name.rpartition("valve/extend")
+            if extend and f"{leg}valve/retract" in log:
+                pair = np.stack([log[name], log[f"{leg}valve/retract"]])
+                both = np.unique(pair[:, np.isfinite(pair).all(axis=0)], axis=1)
+                modes |= {f"{on:.0f}{back:.0f}" for on, back in both.T}
     robot = sha256(robot_files(spec.robot)[0]) if spec.robot else None
     spans = [(min(x), max(x)) if x else None for x in (apex, speed)]
     load = sum(e.value("m") for e in spec.effects if e.kind == "payload")
-    known: dict[str, Any] = {"modes": modes, "robot": robot, "payload": load}
+    known: dict[str, Any] = {"modes": tuple(sorted(modes)), "robot": robot, "payload": load}
     return Measured(apex=spans[0], speed=spans[1], supply=supply, **known)
 
 
@@ -72,17 +79,6 @@ def _speed(log: Trajectory) -> Array:
         for n in ("body/x", "body/z")
     ]
     return np.where(inside, np.hypot(*steps) / (2.0 * AROUND), 0.0)
-
-
-def _modes(log: Trajectory) -> set[str]:
-    """Valve modes of a log's legs: extend valve, then retract valve."""
-    legs = {name[: -len("valve/extend")] for name in log.names if name.endswith("valve/extend")}
-    found: set[str] = set()
-    for leg in (leg for leg in legs if f"{leg}valve/retract" in log):
-        pair = np.stack([log[f"{leg}valve/extend"], log[f"{leg}valve/retract"]])
-        both = np.unique(pair[:, np.isfinite(pair).all(axis=0)], axis=1)
-        found |= {f"{extend:.0f}{retract:.0f}" for extend, retract in both.T}
-    return found
 
 
 Paths = Sequence[str | Path]
