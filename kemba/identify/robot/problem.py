@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 
 import numpy as np
 from typing_extensions import Self
@@ -63,14 +62,13 @@ class RobotProblem(RobotForces):
         self,
         logs: Sequence[Trajectory],
         model: Model,
-        unknown: ForceDensity | None = None,
         figures: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.logs = tuple(logs)
         self.window = WINDOW  # innovations are one-step errors
-        self.model, self.unknown = model, unknown or ForceDensity()
-        if any(log.meta.get("torques") is False for log in logs):
-            self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
+        blind = any(log.meta.get("torques") is False for log in logs)
+        # of hips without a logged torque N2.m2.s: 10 N.m for 0.1 s
+        self.model, self.unknown = model, ForceDensity(hip=10.0) if blind else ForceDensity()
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)
@@ -141,7 +139,7 @@ class RobotProblem(RobotForces):
         # usual figures: those found beside a share of the old chambers are distorted by it
         values = {p.name: p.typical for p in self.candidates[ORIFICE].shapes}
         model = with_orifices(self.model, values)
-        found = type(self)(self.logs, model, self.unknown, free_figures(values))
+        found = type(self)(self.logs, model, free_figures(values))
         dropped = {*FREE_THEN, *(set(robot_candidates(self.model)) - set(self.candidates))}
         left = found.candidates.items()
         found.candidates = {k: c for k, c in left if not {k, k.split(":")[0]} & dropped}
