@@ -19,7 +19,6 @@ from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
 from kemba.identify.infer.formula import Formula, look
 from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_aliases
 from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
-from kemba.identify.infer.residual import drifting, rest_of
 from kemba.identify.infer.search import Search, SearchSettings
 from kemba.identify.infer.selection import (
     Selection,
@@ -46,7 +45,7 @@ from kemba.identify.infer.structure import (
     joined,
     structure_row,
 )
-from kemba.identify.infer.verdict import Caveats, caveats_of, is_sure, verdict_on
+from kemba.identify.infer.verdict import Caveats, caveats_of, is_sure, rest_of, verdict_on
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 
@@ -173,12 +172,9 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     # what is too small to be reported still explains: a formula must do better than with it
     slight = best and material(search, likeliest) == best
     formula = look(search, likeliest if slight else best)
-    drift = drifting(search, best)
-    if drift is not None and formula is not None and drift.nats > formula.gain:
-        formula = None
     caveats = Caveats((ENDED,) if ended else ())
     if formula is None:
-        caveats = caveats_of(search, selection, drift, kept, ended)
+        caveats = caveats_of(search, selection, kept, ended)
     if whole and verdict_on(best, formula, caveats) not in WRITTEN:
         joint = None
     if not best and formula is None and not caveats.reasons:

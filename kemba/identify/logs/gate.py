@@ -74,9 +74,8 @@ def _columns(log: Trajectory) -> Iterator[KembaError]:
     for name in needed(log):
         if name not in log and not enough:
             hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
-            header, why = (
-                (f"{name} [{logged[name]}]", "the model's rig asks for it") if rig else (name, "")
-            )
+            header = f"{name} [{logged[name]}]" if rig else name
+            why = "the model's rig asks for it" if rig else ""
             yield _log_fault(log, f"needs the column '{header}', which is missing", why, hint)
     for name in log.names:
         unit = "1" if "valve/" in name else None
