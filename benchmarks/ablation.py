@@ -103,7 +103,7 @@ RULES = [
     Rule("swaps", SEARCH + "_swap", lambda s, best: best, _differs),
     Rule("followed twice", "infer.search:SearchSettings", values={"followed": 1}),
     Rule("colour anew", "infer.null_model:Baseline.seen_from", lambda b, theta: None, always),
-    Rule("drifting sensors", "infer.colour:_with_drift", lambda p, theta: p,
+    Rule("drifting sensors", "infer.null_model:_with_drift", lambda p, theta: p,
          lambda result, p, theta: result is not p),
     Rule("spikes", "problem.noise:caution", lambda r: None,
          lambda result, r: bool(np.any(result < 1.0))),
@@ -111,7 +111,6 @@ RULES = [
          values={"tolerances": (1.0,)}),
     Rule("steps to the mode", "infer.mode:SmallEffectsSettings",
          values={"rounds": 0}),
-    Rule("other shapes", "infer.refit:RefitSettings", values={"factor": 1e9}),
     Rule("enlarged noise", "infer.significance:_enlarged",
          lambda own, left, root, power: own.T @ left, always),
     Rule("material", "infer.selection:material", lambda s, h: h),
@@ -132,8 +131,8 @@ RULES = [
     Rule("formula: drifts", "infer.formula:drift_columns",
          lambda p: (np.empty((len(p.rows()), 0)), np.empty(0)),
          lambda result, p: bool(result[0].size)),
-    Rule("unfinished", "infer.residual:unfinished", lambda *_: False),
-    Rule("pattern left", "infer.residual:pattern_left", lambda *_: ""),
+    Rule("unfinished", "infer.verdict:unfinished", lambda *_: False),
+    Rule("pattern left", "infer.verdict:pattern_left", lambda *_: ""),
     Rule("mixture", "infer.structure:is_mixture", lambda share: False),
     Rule("nothing explains", "answer:VerdictSettings", values={"unexplained": -1.0}),
     Rule("error left", "answer:VerdictSettings", values={"whole": np.inf}),
@@ -222,6 +221,7 @@ LEARNING = (
     "in_detail",
 )
 PREDICTING = ("residual", "residuals", "jacobian")
+WITHIN = {"spikes"}  # rules within what problems learn, which is then remembered by itself
 
 
 def _key(value: Any) -> Any:
@@ -235,15 +235,18 @@ def _key(value: Any) -> Any:
 
 
 @contextmanager
-def remembered() -> Iterator[None]:
-    """Within this block problems remember what they predicted and learnt."""
+def remembered() -> Iterator[list[str]]:
+    """Within this block problems remember what they predicted and learnt; what they learnt, apart
+    for each content of the list."""
     known: dict[Any, Any] = {}
+    apart: list[str] = []
     alive: list[Any] = []
 
     def remember(name: str, original: Callable[..., Any]) -> Callable[..., Any]:
         def call(self: Any, *args: Any, **kwargs: Any) -> Any:
             given = [list(a) if hasattr(a, "__next__") else a for a in args]
-            key = id(self), name, _key(given), _key(kwargs)
+            learns = name.rpartition(".")[2] in LEARNING
+            key = id(self), name, _key(given), _key(kwargs), tuple(apart if learns else ())
             if key not in known:
                 alive.extend([self, *given])
                 known[key] = original(self, *given, **kwargs)
@@ -270,7 +273,7 @@ def remembered() -> Iterator[None]:
             for name in (*LEARNING, *PREDICTING):
                 new = remember(f"{cls.__name__}.{name}", getattr(cls, name))
                 stack.enter_context(patch.object(cls, name, new))
-        yield
+        yield apart
 
 
 def unjudged(problem: Any, hypothesis: Any, theta: Any) -> JointFit:
@@ -358,7 +361,7 @@ def run(study: str, index: int, setting: Record, groups: list[str], out: Path) -
         said = " + ".join(found.get("named", ())) or found.get("verdict", "failed")
         print(f"{study} {index} without {name or 'nothing'}: {said}", flush=True)
 
-    with remembered():
+    with remembered() as apart:
         acted: set[str] = set()
         if (study, index, "") not in done or not groups:
             with watched(acted):
@@ -368,9 +371,11 @@ def run(study: str, index: int, setting: Record, groups: list[str], out: Path) -
         for name in wanted or [r.name for r in RULES if r.name in acted]:
             if (study, index, name) in done:
                 continue
+            rules = [one.strip() for one in name.split(",")]
+            apart[:] = sorted(WITHIN & set(rules))
             with ExitStack() as stack:
-                for one in name.split(","):
-                    stack.enter_context(without(BY_NAME[one.strip()]))
+                for one in rules:
+                    stack.enter_context(without(BY_NAME[one]))
                 keep(name, answered(problem, setting, truth))
     if not groups:
         report.append(out, {"study": study, "index": index, "without": "end"})

@@ -17,7 +17,7 @@ from twin.measure import Sensors, fault_channels, sensor_fault
 
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.candidates import effect_candidates, nominal_figures, sensor_candidates
-from kemba.identify.problem.types import Candidate
+from kemba.identify.problem.problem import Candidate
 from kemba.model.spec import load_model
 
 COLUMN = {  # of the twin's table of figures, by nominal figure of the rig's model

@@ -23,8 +23,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "benchmarks")]
 from blind import report
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 
-from kemba.identify.design.rig import JudgedRig, design_rig_test
-from kemba.identify.design.separation import ExperimentSettings
+from kemba.identify.design.rig import design_rig_test
+from kemba.identify.design.separation import ExperimentSettings, JudgedTest
 from kemba.model.spec import load_model
 from kemba.scenarios.share import wilson
 
@@ -59,15 +59,15 @@ def run(truth: str, other: str, seed: int) -> dict[str, Any]:
         seconds = time.process_time() - started
         assert design is not None
 
-        def told(judged: JudgedRig) -> float | None:
+        def told(judged: JudgedTest) -> float | None:
             if judged.log_s > LONGEST:
                 return None
-            logs = machine.done(judged.rig, stroke, folder)
+            logs = machine.done(judged.test, stroke, folder)
             return measured_evidence(problem_of(logs, model), rivals, truth, other)
 
         sides = {
             side: {
-                "rig": judged.rig.name,
+                "rig": judged.test.name,
                 "log_s": judged.log_s,
                 "expected": judged.evidence.least,
                 "measured": told(judged),

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.types import Array
-from kemba.identify.published import PAPER_FORCE, PAPER_RISE
+from kemba.identify.problem.problem import Array
 from kemba.mechanism import Cylinder, load_cylinder
+from kemba.plant.published import PAPER_FORCE, PAPER_RISE
 
 MADE_ON = "dsnu-25-70"  # the cylinder on which the tables were measured
 

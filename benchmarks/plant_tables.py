@@ -10,8 +10,8 @@ rig as the paper's Fig. 3, 4, 6 and 7 do, with the fitted model in the last.
 import argparse
 from pathlib import Path
 
-from kemba.identify.published import as_json
 from kemba.plant.characterise import characterise
+from kemba.plant.published import as_json
 from kemba.plant.rigs import bench_model, load_rig, run_rig
 from kemba.plotting import plot_rig
 from kemba.plotting.style import save_figure

@@ -27,12 +27,11 @@ from twin.figures import Robot
 from twin.measure import Sensors
 
 from kemba.identify.answer import DiscoverSettings
-from kemba.identify.infer.colour import best_fit
 from kemba.identify.infer.linear import time_blocks
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import left_out_noise
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.workflow import admitted, model_of
 
 SEED = 9_000
@@ -50,7 +49,7 @@ def powers(seed: int, folder: Path) -> tuple[float, float, float]:
     base, problem = search.base, search.problem
     mode, jacobian = base.point.mode, base.jacobian
     linear = mode.linear
-    left = mode.residual + jacobian @ (best_fit(linear) - linear.at)
+    left = mode.residual + jacobian @ (linear.best() - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
     along = directions(jacobian, base.ranker(linear).nuisance)
     plain = np.stack([jacobian[blocks == b].T @ left[blocks == b] for b in np.unique(blocks)])

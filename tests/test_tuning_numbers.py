@@ -35,7 +35,7 @@ CONSTANTS = {  # file -> names, why
         "HIP_RANGE COUNTER_CLOCKWISE DOWN",
         "geometry: where the knee would rise above the body; directions",
     ),
-    "identify/published.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
+    "plant/published.py": ("PAPER_RISE PAPER_FORCE PAPER_DEAD_TIME", "the paper's figures"),
     "plant/rigs.py": (
         "FORCE_NOISE VALVES SPEEDS",
         "noise of a force transducer; what a bench test does unless its file says more",

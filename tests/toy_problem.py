@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 
 EFFECTS = ("bend", "drag", "hum", "kick", "ramp", "twin", "wave")
 

@@ -36,7 +36,7 @@ from kemba.identify.discover import discover
 from kemba.identify.infer.refit import Fit
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Theta
 
 STUDIES = (
     *("bench", "robot", "second"),

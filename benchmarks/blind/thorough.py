@@ -16,8 +16,7 @@ from kemba.identify.infer.null_model import Baseline, LinearisationPoint, effect
 from kemba.identify.infer.refit import Fit
 from kemba.identify.infer.spike_slab import Hypothesis, Ranker
 from kemba.identify.infer.windows import START
-from kemba.identify.problem.problem import Problem, bounded
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.problem import Array, Problem, Theta, bounded
 
 
 class ThoroughSettings:

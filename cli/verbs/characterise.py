@@ -63,9 +63,9 @@ def characterise(
             raise typer.BadParameter(what, param_hint="--supply" if supply else "--figure")
         _own_rig(logs, model, out, force, json, quiet, column_map)
         return
-    from kemba.identify.published import as_json
     from kemba.logs import load_map, log_files, open_log
     from kemba.plant.characterise import characterise as fit
+    from kemba.plant.published import as_json
     from kemba.quantity import to_si
     from kemba_cli.next_steps import after_model, say_next
 
@@ -166,7 +166,7 @@ def _print(found: Characteristics) -> None:
     """Tables I and II beside the paper's, with 95 % intervals, and how well eq. 4 to 7 predict."""
     from rich.table import Table
 
-    from kemba.identify.published import as_json
+    from kemba.plant.published import as_json
 
     for title, columns, rows in tables(as_json(found)):
         if rows:

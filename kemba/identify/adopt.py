@@ -141,8 +141,7 @@ def adopt_answer(folder: str | Path, out: Path, only_sure: bool = False) -> tupl
 
 
 def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
-    """An answer without some of its effects: what the others are, these being absent, as its joint
-    covariance tells."""
+    """An answer without some of its effects: what the others are then, by its joint covariance."""
     found = {**answer, "added": [e for e in answer["added"] if e not in dropped]}
     joint = answer.get("covariance")
     if not dropped or not joint:
@@ -152,12 +151,19 @@ def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
     off = {f"{e}.{p}": value for e in dropped for p, value in BY_KIND[e.split(":")[0]].off.items()}
     gone = [i for i, name in enumerate(names) if name in off]
     kept = [i for i, name in enumerate(names) if name.rsplit(".", 1)[0] not in dropped]
-    step = [off[names[i]] - rows[_of(names[i])[0]]["parameters"][_of(names[i])[1]]["value"]
-            for i in gone]  # fmt: skip
+    parts = [names[i].rpartition(".") for i in gone]
+    step = [off[names[i]] - rows[effect]["parameters"][parameter]["value"]
+            for i, (effect, _, parameter) in zip(gone, parts, strict=True)]  # fmt: skip
     gain = c[np.ix_(kept, gone)] @ np.linalg.pinv(c[np.ix_(gone, gone)])
     moved = dict(zip([names[i] for i in kept], gain @ np.array(step), strict=True))
     left = c[np.ix_(kept, kept)] - gain @ c[np.ix_(gone, kept)]
-    found["ranking"] = [_moved(row, moved) for row in answer["ranking"]]
+    found["ranking"] = [
+        {**row, "parameters": {
+            p: {**v, "value": v["value"] + float(moved.get(f"{row['effect']}.{p}", 0.0))}
+            for p, v in row["parameters"].items()
+        }}
+        for row in answer["ranking"]
+    ]  # fmt: skip
     found["figures"] = {
         n: v + float(moved[n]) if n in moved else v
         for n, v in (answer.get("figures") or {}).items()
@@ -167,20 +173,6 @@ def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
     evidence = answer.get("evidence") or {}
     found["evidence"] = {k: v for k, v in evidence.items() if k != "error_held_out"}
     return found
-
-
-def _of(name: str) -> tuple[str, str]:
-    effect, _, parameter = name.rpartition(".")
-    return effect, parameter
-
-
-def _moved(row: Mapping[str, Any], moved: Mapping[str, float]) -> dict[str, Any]:
-    """A row of the ranking with its parameters where the others' absence moves them."""
-    values = {
-        p: {**v, "value": v["value"] + float(moved.get(f"{row['effect']}.{p}", 0.0))}
-        for p, v in row["parameters"].items()
-    }
-    return {**row, "parameters": values}
 
 
 def adopt_effect(folder: str | Path, effect: str, out: Path) -> Path:

@@ -218,12 +218,8 @@ def _named(ranked: Ranked) -> str:
 
 
 def _doubt(parts: Sequence[Ranked]) -> str:
-    texts = [
-        f" These data cannot tell {r.effect} from {', '.join(r.equivalent_to)}."
-        for r in parts
-        if r.equivalent_to
-    ]
-    return "".join(texts)
+    alike = ((r.effect, ", ".join(r.equivalent_to)) for r in parts if r.equivalent_to)
+    return "".join(f" These data cannot tell {effect} from {others}." for effect, others in alike)
 
 
 def read_answer(folder: str | Path) -> dict[str, Any]:

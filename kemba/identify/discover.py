@@ -17,10 +17,8 @@ from kemba.identify.answer import (
 )
 from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
 from kemba.identify.infer.formula import Formula, look
-from kemba.identify.infer.identifiability import Identifiability, identifiability
 from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_aliases
 from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
-from kemba.identify.infer.residual import drifting, rest_of
 from kemba.identify.infer.search import Search, SearchSettings
 from kemba.identify.infer.selection import (
     Selection,
@@ -30,7 +28,14 @@ from kemba.identify.infer.selection import (
     quoted,
     selected,
 )
-from kemba.identify.infer.significance import NullTest, best_gain, null_test, smallest_detectable
+from kemba.identify.infer.significance import (
+    Identifiability,
+    NullTest,
+    best_gain,
+    identifiability,
+    null_test,
+    smallest_detectable,
+)
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.structure import (
     Rebuilt,
@@ -40,7 +45,14 @@ from kemba.identify.infer.structure import (
     joined,
     structure_row,
 )
-from kemba.identify.infer.verdict import Caveats, caveats_of, implausible, is_sure, verdict_on
+from kemba.identify.infer.verdict import (
+    Caveats,
+    caveats_of,
+    implausible,
+    is_sure,
+    rest_of,
+    verdict_on,
+)
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 
@@ -92,13 +104,7 @@ def what_shows(search: Search, test: NullTest) -> Identifiability:
 
 
 def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> Discovery:
-    """The answer from a first guess on.
-
-    Another structure that leaves far less unexplained is built in at once: what else is missing
-    shows only then. Any other is built in where the search names it and its answer is not complete,
-    or a mixture of both structures, which no machine is. Of both answers the one with the smaller
-    error on left-out data counts; a complete one counts more than a mixture.
-    """
+    """The answer from a first guess on, of this structure or another that leaves far less."""
     guessed = search.problem.structures & set(guess)
     least = 0.0 if guessed else SearchSettings.structural
     theta = search.points[guess].fit.theta
@@ -173,12 +179,9 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     # what is too small to be reported still explains: a formula must do better than with it
     slight = best and material(search, likeliest) == best
     formula = look(search, likeliest if slight else best)
-    drift = drifting(search, best)
-    if drift is not None and formula is not None and drift.nats > formula.gain:
-        formula = None
     caveats = Caveats((ENDED,) if ended else ())
     if formula is None:
-        caveats = caveats_of(search, selection, drift, kept, ended)
+        caveats = caveats_of(search, selection, kept, ended)
     if whole and verdict_on(best, formula, caveats) not in WRITTEN:
         joint = None
     if not best and formula is None and not caveats.reasons:
@@ -208,8 +211,7 @@ def _add(answer: Answer, joint: JointFit) -> None:
 
 
 def _undecided(search: Search, test: NullTest, kept: HeldOut | None) -> Discovery:
-    """What logs allow to say that are too short for anything to be significant: whether something
-    differs, but not what."""
+    """What logs tell that are too short for significance: whether something differs, not what."""
     gain, caveats = best_gain(search), Caveats()
     differs = test.share(gain) <= DiscoverSettings.significant
     if differs or error(search, NULL, kept) > VerdictSettings.whole:

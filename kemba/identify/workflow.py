@@ -15,12 +15,11 @@ from kemba.identify.adopt import COVARIANCE, reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.discover import Discovery, discover
-from kemba.identify.infer.colour import with_learnt_colour
+from kemba.identify.infer.null_model import with_learnt_colour
 from kemba.identify.infer.windows import error_ratio, free_starts
 from kemba.identify.logs.gate import BadData, check_logs, limits_of, sentence
 from kemba.identify.logs.reading import excerpts, read_logs, taken_on
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array, Problem
 from kemba.logs import load_map
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Model, build_model, load_model, load_spec
@@ -56,11 +55,18 @@ def _measured_in(logs: Sequence[Trajectory], model: str | Path) -> Measured:
     apex = [float(np.nanmax(log["body/z"])) for log in body]
     speed = [float(np.nanmax(_speed(log))) for log in body]
     supply = (spec.supply, spec.supply) if spec.supply else None
-    modes = tuple(sorted({mode for log in logs for mode in _modes(log)}))
+    modes: set[str] = set()  # of a leg's valves: extend, then retract
+    for log in logs:
+        for name in log.names:
+            leg, extend, _ = name.rpartition("valve/extend")
+            if extend and f"{leg}valve/retract" in log:
+                pair = np.stack([log[name], log[f"{leg}valve/retract"]])
+                both = np.unique(pair[:, np.isfinite(pair).all(axis=0)], axis=1)
+                modes |= {f"{on:.0f}{back:.0f}" for on, back in both.T}
     robot = sha256(robot_files(spec.robot)[0]) if spec.robot else None
     spans = [(min(x), max(x)) if x else None for x in (apex, speed)]
     load = sum(e.value("m") for e in spec.effects if e.kind == "payload")
-    known: dict[str, Any] = {"modes": modes, "robot": robot, "payload": load}
+    known: dict[str, Any] = {"modes": tuple(sorted(modes)), "robot": robot, "payload": load}
     return Measured(apex=spans[0], speed=spans[1], supply=supply, **known)
 
 
@@ -73,17 +79,6 @@ def _speed(log: Trajectory) -> Array:
         for n in ("body/x", "body/z")
     ]
     return np.where(inside, np.hypot(*steps) / (2.0 * AROUND), 0.0)
-
-
-def _modes(log: Trajectory) -> set[str]:
-    """Valve modes of a log's legs: extend valve, then retract valve."""
-    legs = {name[: -len("valve/extend")] for name in log.names if name.endswith("valve/extend")}
-    found: set[str] = set()
-    for leg in (leg for leg in legs if f"{leg}valve/retract" in log):
-        pair = np.stack([log[f"{leg}valve/extend"], log[f"{leg}valve/retract"]])
-        both = np.unique(pair[:, np.isfinite(pair).all(axis=0)], axis=1)
-        found |= {f"{extend:.0f}{retract:.0f}" for extend, retract in both.T}
-    return found
 
 
 Paths = Sequence[str | Path]
@@ -116,7 +111,10 @@ def discover_logs(
     fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
     found: Discovery | None = None
     try:
-        _check_disjoint(fitted, kept)
+        paths = ({Path(log.meta["path"]).resolve() for log in some} for some in (fitted, kept))
+        if both := set.intersection(*paths):
+            what = f"{sorted(both)[0].name} is also among the logs to be fitted"
+            raise KembaError("--holdout", what)
         fitted, kept, said = _kept_aside(fitted, kept)
         built = model_of(fitted, model)
         checked = check_all([*fitted, *kept], built)
@@ -165,9 +163,7 @@ def _kept_aside(
 
 
 def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: str) -> Problem:
-    """Tell the errors on quoted logs as `compare` does, of the model as it is (`judge`), and of
-    the one that is written; what does not predict better there is not written. Returns the logs
-    under the better one, with their noise."""
+    """Tell errors as `compare` does; drop a model that is no better. The better one's problem."""
     before = answer.error_before, answer.error_after
     evidence, judge = load_spec(model).evidence, _with_noise(judge)
     stated = error_ratio(judge, _figures_felt(judge, evidence.figures if evidence else {}))
@@ -195,8 +191,7 @@ def _evidence(
     kept: Sequence[Trajectory],
     model: str,
 ) -> dict[str, Any] | None:
-    """What the model that is written rests on, as its YAML says it; None where none is written.
-    `judge`: the quoted logs under it."""
+    """What the written model rests on, as its YAML says it; `judge`: quoted logs under it."""
     if not answer.writes:
         return None
     used = [*((log, "learnt") for log in fitted), *((log, "quoted") for log in kept)]
@@ -248,6 +243,16 @@ def admitted(logs: Sequence[Trajectory], model: Model) -> tuple[Problem, list[st
     return problem, [*cut, *problem.validate()]
 
 
+def posed(logs: Sequence[Trajectory], model: str, tell: Tell = silent) -> tuple[Problem, list[str]]:
+    """The problem that logs pose to a model, and remarks. Raises KembaError; BadData where the logs
+    cannot be right."""
+    built = model_of(logs, model)
+    remarks = [*built.remarks, *check_all(logs, built)]
+    tell("finding the motion in the logs")
+    problem, more = admitted(logs, built)
+    return problem, [*remarks, *more]
+
+
 def check_log(
     path: str | Path, model: str = "planning", column_map: str | Path | None = None
 ) -> tuple[Trajectory, list[str]]:
@@ -257,9 +262,7 @@ def check_log(
     Raises KembaError where the file cannot be read; BadData where the log cannot be right.
     """
     logs = read_logs([path], load_map(column_map) if column_map else None)
-    built = model_of(logs, model)
-    remarks = [*built.remarks, *check_all(logs, built)]
-    return logs[0], [*remarks, *admitted(logs, built)[1]]
+    return logs[0], posed(logs, model)[1]
 
 
 def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
@@ -293,15 +296,6 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     write_json(out / "answer.json", data | {"base": reference(model)})
 
 
-def _check_disjoint(fitted: Sequence[Trajectory], kept: Sequence[Trajectory]) -> None:
-    """A held-out log must not be fitted as well."""
-    both = {Path(t.meta["path"]).resolve() for t in fitted} & {
-        Path(t.meta["path"]).resolve() for t in kept
-    }
-    if both:
-        raise KembaError("--holdout", f"{sorted(both)[0].name} is also among the logs to be fitted")
-
-
 PLANNED = ("body/x", "body/z", "body/pitch", "hip/q", "piston/x")
 
 
@@ -315,9 +309,8 @@ def compare_logs(
     """Where `model` fails on these logs, and how far a planned `run` (a folder or a trajectory
     CSV) was missed. `tell` gets the name of every stage. Raises KembaError; BadData where the logs
     cannot be right."""
-    columns = load_map(column_map) if column_map else None
     tell("reading the logs")
-    read = read_logs(logs, columns)
+    read = read_logs(logs, load_map(column_map) if column_map else None)
     found, problem = compare_read(read, model, tell)
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)
@@ -329,10 +322,7 @@ def compare_read(
     read: Sequence[Trajectory], model: str, tell: Tell = silent
 ) -> tuple[Comparison, Problem]:
     """Where `model` fails on logs that were read. Raises as `compare_logs` does."""
-    built = model_of(read, model)
-    check_all(read, built)
-    tell("finding the motion in the logs")
-    problem, _ = admitted(read, built)
+    problem, _ = posed(read, model, tell)
     tell("learning the noise of the sensors")
     problem = _with_noise(problem)
     tell("comparing with the model")

@@ -14,7 +14,7 @@ from matplotlib.figure import Figure, FigureBase, SubFigure
 from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.problem.types import MissingForce
+from kemba.identify.problem.problem import MissingForce
 from kemba.plotting.style import (
     BLACK,
     BLUE,

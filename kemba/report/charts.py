@@ -11,8 +11,8 @@ from typing import Any, Literal
 import numpy as np
 
 from kemba.files import plain
-from kemba.identify.logs.clock import in_plans_clock
 from kemba.plotting.source import Source, load_source
+from kemba.report.plan_clock import in_plans_clock
 from kemba.runs import PLANT_RUN, Run
 from kemba.trajectory import Array, Trajectory
 

@@ -12,7 +12,7 @@ import numpy as np
 from kemba.errors import enumerated
 from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
 from kemba.identify.compare.compare import Comparison
-from kemba.identify.problem.types import MissingForce
+from kemba.identify.problem.problem import MissingForce
 from kemba.identify.workflow import check_all, compare_read, model_of
 from kemba.report.charts import COMPARED, Book, Chart, Curve, meter, onto, picture, table
 from kemba.stopwatch import Tell, silent

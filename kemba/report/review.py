@@ -12,7 +12,6 @@ from kemba.config import load_yaml
 from kemba.errors import KembaError, enumerated
 from kemba.folders import place_for, typed
 from kemba.identify.answer import read_answer
-from kemba.identify.logs.clock import in_plans_clock, start_of
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import OWN_RIGS, read_logs
 from kemba.logs import load_map
@@ -40,6 +39,7 @@ from kemba.report.motion import (
     marks_of,
     rig_charts,
 )
+from kemba.report.plan_clock import in_plans_clock, start_of
 from kemba.report.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.view import page_text, stage, write_page
 from kemba.runs import POLICY, Run, load_run

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
-from kemba.identify.published import PAPER_FORCE, PAPER_RISE
 from kemba.mechanism import load_cylinder
 from kemba.model import Model, load_model
 from kemba.plant.characterise import Characteristics, characterise, linear
+from kemba.plant.published import PAPER_FORCE, PAPER_RISE
 from kemba.plant.rigs import (
     DynamometerRig,
     LockedRig,

@@ -17,6 +17,7 @@ from kemba.identify.logs.gate import ROW
 from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.logs.reading import held
 from kemba.identify.problem.noise import difference_sigma, telling
+from kemba.identify.problem.problem import Array, Flags
 from kemba.identify.problem.sensor_noise import (
     ChannelNoise,
     ColourSettings,
@@ -26,7 +27,6 @@ from kemba.identify.problem.sensor_noise import (
     pairs,
     weighted,
 )
-from kemba.identify.problem.types import Array, Flags
 from kemba.trajectory import Trajectory
 
 # How the velocity of an imposed motion is found.
@@ -74,8 +74,7 @@ def smooth_motion(
 
 
 def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
-    """Even times (m,) [s] of about the same step, x (m,) there, and the step [s]; rows without a
-    value are bridged."""
+    """Even times (m,) [s], x (m,) there, rows without a value bridged, and the step [s]."""
     good = np.isfinite(x)
     step = float(np.median(np.diff(time)))
     count = max(int(np.ceil((time[-1] - time[0]) / step)) + 1, 8)
@@ -86,12 +85,7 @@ def _even_grid(time: Array, x: Array) -> tuple[Array, Array, float]:
 def _adaptive(
     values: Array, sigma: float, step: float, colour: ChannelNoise
 ) -> tuple[Array, Array, Array]:
-    """Position, rate and its error, over the window that is chosen sample by sample.
-
-    A cubic cannot follow every motion. A quintic in the same window follows more of them. The
-    square of their difference, without the share that noise has in it, estimates the square of the
-    cubic's bias.
-    """
+    """Position, rate, its error, over windows of least risk: the quintic tells the cubic's bias."""
     n = len(values)
     best = np.full(n, np.inf)
     position, rate = values.copy(), np.zeros(n)
@@ -100,7 +94,8 @@ def _adaptive(
             break
         x, v = (local_fit(values, width, step, 3, k) for k in (0, 1))
         finer = local_fit(values, width, step, 5, 1)
-        gain, finer_gain = (_gains(n, width, step, order, colour) for order in (3, 5))
+        at = np.minimum(np.arange(n), width) + np.maximum(np.arange(n) - (n - 1 - width), 0)
+        gain, finer_gain = (_slope_sigma(width, step, order, colour)[at] for order in (3, 5))
         noise = (sigma * gain) ** 2
         bias = _mean((finer - v) ** 2, max(width // 2, 2)) - (sigma * finer_gain) ** 2 + noise
         risk = noise + np.maximum(bias, 0.0)
@@ -110,15 +105,9 @@ def _adaptive(
     return position, _mean(rate, 1), np.sqrt(best)
 
 
-def _gains(n: int, width: int, step: float, order: int, colour: ChannelNoise) -> Array:
-    """1 sigma (n,) [s-1] of the slope of `local_fit` per stated sigma of the values."""
-    gain = _slope_sigma(width, step, order, colour)
-    return np.concatenate([gain[:width], np.full(n - 2 * width, gain[width]), gain[width + 1 :]])
-
-
 @lru_cache(maxsize=256)
 def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> Array:
-    """The same (2 width + 1,) at each place of the window."""
+    """1 sigma [s-1] of `local_fit`'s slope per stated sigma at each place of the window."""
     slope = weights(width, order, 1)
     if not colour.lags:
         return np.asarray(colour.white * np.linalg.norm(slope, axis=1) / step)
@@ -129,10 +118,7 @@ def _slope_sigma(width: int, step: float, order: int, colour: ChannelNoise) -> A
 def _weigh_in(
     grid: Array, rate: Array, spread: Array, time: Array, v: Array
 ) -> tuple[Array, Array]:
-    """The mean of measured and derived velocity, weighted by their errors.
-
-    Where the two contradict each other, the derived one counts alone.
-    """
+    """Measured and derived velocity by their errors; the derived one where they contradict."""
     good = np.isfinite(v)
     measured = np.interp(grid, time[good], v[good])
     sigma = max(difference_sigma(v[good]), FINEST_SPEED)
@@ -159,39 +145,28 @@ REST = 2e-3  # speed up to which the piston rests [m.s-1]
 MOST = 10.0
 
 
-@dataclass(frozen=True)
-class _Quiet:
-    """One log on an even grid: what the cubic leaves (n,) in sigmas, where it rests, step [s]."""
-
-    left: Array
-    rest: Flags
-    step: float
-
-
 def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     """Noise of the position sensor that all `logs` (times [s] and positions [m], both (n,)) share,
     in each log's `difference_sigma`; white where the piston rests too little to tell."""
     quiet = [found for time, x in logs if (found := _quiet(time, x)) is not None]
     settings = ColourSettings
-    if sum(int(q.rest.sum()) for q in quiet) < settings.fewest:
+    if sum(int(np.isfinite(left).sum()) for left, _ in quiet) < settings.fewest:
         return ChannelNoise()
-    n = max(len(q.left) for q in quiet)
-    errors = np.full((n, len(quiet), 1), np.nan)
-    for i, q in enumerate(quiet):
-        errors[: len(q.left), i, 0] = np.where(q.rest, q.left, np.nan)
-    step = float(np.median([q.step for q in quiet]))
+    errors = np.full((max(len(left) for left, _ in quiet), len(quiet), 1), np.nan)
+    for i, (left, _) in enumerate(quiet):
+        errors[: len(left), i, 0] = left
+    step = float(np.median([step for _, step in quiet]))
     memories = (0.0, *settings.memories)
-    columns = [_expected(memory, step) for memory in memories]
-    counts = pairs(errors)
+    columns, counts = [_expected(memory, step) for memory in memories], pairs(errors)
     measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
     kinds = [Kind(0, memory) for memory in memories]
-    most = np.array([MOST])
-    a, b = weighted(columns, measured, counts)
-    return chosen_noise(a, b, kinds, most, np.array([True]))[0]
+    told = weighted(columns, measured, counts)
+    return chosen_noise(*told, kinds, np.array([MOST]), np.array([True]))[0]
 
 
-def _quiet(time: Array, x: Array) -> _Quiet | None:
-    """A log without its motion; None where it is too short."""
+def _quiet(time: Array, x: Array) -> tuple[Array, float] | None:
+    """What the cubic leaves (n,) of x, in sigmas, NaN where it moves, and the step [s]; None of a
+    log that is too short."""
     grid, values, step = _even_grid(time, x)
     if len(grid) < 2 * QUIET_WIDTH + 1:
         return None
@@ -199,12 +174,11 @@ def _quiet(time: Array, x: Array) -> _Quiet | None:
     rest = maximum_filter1d(np.abs(v), 2 * QUIET_WIDTH + 1) < REST
     rest[:QUIET_WIDTH] = rest[-QUIET_WIDTH:] = False
     sigma = max(difference_sigma(x[np.isfinite(x)]), FINEST)
-    return _Quiet((values - smooth) / sigma, rest, step)
+    return np.where(rest, (values - smooth) / sigma, np.nan), step
 
 
 def _expected(memory: float, step: float) -> Array:
-    """Autocovariances (1, lags) of what the cubic leaves of noise of unit sigma and this memory
-    [s], on an even grid of this `step` [s]."""
+    """Autocovariances (1, lags) of what the cubic leaves of unit noise with this memory [s]."""
     width, lags = QUIET_WIDTH, np.array(ColourSettings.lags)
     left = np.eye(1, 4 * width + 1, 2 * width)[0]
     left = left - local_fit(left, width, 1.0, 3)  # the filter's answer to one reading
@@ -291,7 +265,8 @@ def prepare(
     on = [(u > 0.5).astype(int).astype(str) for u in sent]
     known = ~_unpredictable(log.time, np.isfinite(log["piston/x"]), np.stack(sent))
     keep = {c: np.isfinite(y) & known & telling(y, sigma[c]) for c, y in measured.items()}
-    within = 0.0 if on_rows else _seen_within(log.time)
+    row = float(np.median(np.diff(log.time)))  # within long ones valve edges are blurred
+    within = row if row > ROW and not on_rows else 0.0
     # a change that a row shows happened since the row before
     seen = np.concatenate([log.time[:1], 0.5 * (log.time[1:] + log.time[:-1])])
     extend, retract = (pulses(seen if within else log.time, u) for u in sent)
@@ -299,28 +274,15 @@ def prepare(
     return BenchLog(name, motion, (extend, retract), measured, sigma, modes, keep, within)
 
 
-def _seen_within(time: Array) -> float:
-    """Time [s] between rows where it is so long that valve edges are blurred, else 0."""
-    step = float(np.median(np.diff(time)))
-    return step if step > ROW else 0.0
-
-
 def _noise_of(channel: str, y: Array) -> float:
-    """White noise (1 sigma) of a sample, from readings y (n,), in their unit.
-
-    It is never below a small least noise, so that simulated logs without any noise can be judged.
-    """
+    """White noise (1 sigma) of a sample of y (n,); not zero even in a simulation without noise."""
     least = FINEST_FORCE if channel == "piston/F" else FINEST_PRESSURE
     spread = float(np.ptp(y[np.isfinite(y)]))
     return max(difference_sigma(y), least + FINEST_SHARE * spread)
 
 
 def _unpredictable(time: Array, good: Flags, sent: Array) -> Flags:
-    """Rows (n,) that cannot be predicted: in and just after gaps of the position and of the time.
-
-    Where a valve switched within a gap, the moment is not known. The rows after such a gap count
-    again when the chambers no longer depend on that moment.
-    """
+    """Rows (n,) in and just after gaps; longer where a valve switched within, unknown when."""
     known = np.flatnonzero(good)
     wide = np.flatnonzero(np.diff(time[known]) > GAP)
     hidden = np.zeros(len(time), dtype=bool)

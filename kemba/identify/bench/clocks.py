@@ -12,11 +12,9 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog, SmoothedMotion
-from kemba.identify.infer.colour import best_fit
-from kemba.identify.infer.linear import Linear, condense, names_of, priors
+from kemba.identify.infer.linear import condense, names_of, priors
 from kemba.identify.logs.reading import GateSettings
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Problem, Theta
 from kemba.trajectory import Trajectory
 
 COMMANDS, POSITION = "clock:valve", "clock:piston/x"  # names in theta
@@ -135,7 +133,8 @@ class _Linearised:
     def cost(self, theta: Theta) -> float:
         """What the best fit about theta leaves."""
         at, r = priors(self.problem, theta, self.names), self.problem.residual(theta)
-        return _least_cost(condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int)))
+        linear = condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int))
+        return linear.cost(linear.best())
 
 
 def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[float, Drift]:
@@ -148,14 +147,6 @@ def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[fl
         options={"xatol": 0.01 * step},
     )
     return float(found.fun), (owner, float(found.x))
-
-
-def _least_cost(linear: Linear) -> float:
-    """Half the sum of squares that the best fit leaves, with what its priors cost."""
-    z = best_fit(linear)
-    (gram, slope, power), step = linear.total, z - linear.at
-    pull = (z - linear.mean) / linear.width
-    return float(0.5 * (power + 2.0 * slope @ step + step @ gram @ step + pull @ pull))
 
 
 def without_drift(log: BenchLog, owner: str, rate: float) -> BenchLog:

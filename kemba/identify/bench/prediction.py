@@ -14,8 +14,8 @@ from kemba.effects.series import Series
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog, Pulses, SmoothedMotion
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
 from kemba.identify.problem.candidates import CompiledModels, nominal_figures
+from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults
-from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.mechanism import Cylinder
 from kemba.model.model import Model
 from kemba.model.rest import Buffered, StatesAlong
@@ -81,7 +81,12 @@ class RigModel:
         seen = motion.time - late
         times, at_sample = _breakpoints(seen, np.concatenate([instants(v) for v in valves]))
         u = np.stack([is_on(v, times) for v in valves])
-        s = self._integrate(times, motion, u, p, start or {})[:, at_sample]
+        begin = self._along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
+        begin += np.array([(start or {}).get(name, 0.0) for name in self.state_names])
+        middle = 0.5 * (times[:-1] + times[1:])
+        along = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
+        driven = np.stack([np.diff(times), *along, *u[:, :-1]])
+        s = self._along.run(begin, driven, p)[:, at_sample]
         blurred = np.stack([share(v, seen) for v in valves])
         n, moved = len(seen), Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
         x, (v0, a) = moved.value, moved.rates
@@ -94,15 +99,6 @@ class RigModel:
             force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0][0]
         return Prediction(force, out[1:3].T, blurred.T, states)
 
-    def _integrate(
-        self, times: Array, motion: SmoothedMotion, u: Array, p: Array, start: Mapping[str, float]
-    ) -> Array:
-        middle = 0.5 * (times[:-1] + times[1:])
-        s0 = self._along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
-        s0 += np.array([start.get(name, 0.0) for name in self.state_names])
-        moved = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
-        return self._along.run(s0, np.stack([np.diff(times), *moved, *u[:, :-1]]), p)
-
     def _mapped(self, kind: str, n: int) -> Buffered:
         if (kind, n) not in self._maps:
             self._maps[kind, n] = Buffered(self._functions[kind].map(n))
@@ -110,10 +106,7 @@ class RigModel:
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
-    """Times of samples, switching instants and sub-steps (m,), and places (n,) of the samples.
-
-    m depends on the number of events only, so that compiled functions can be used again.
-    """
+    """Times (m,) of samples, switchings and sub-steps, and places (n,) of samples."""
     inside = np.clip(events, samples[0], samples[-1])
     pieces = np.ceil(np.diff(samples) / STEP - 1e-6).astype(int)
     fill = [
@@ -249,11 +242,7 @@ def settle_starts(logs: Iterable[BenchLog], predictor: BenchPredictor) -> tuple[
 
 
 def _timed(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
-    """A slow log with the variance that the unknown moments of its switchings make.
-
-    Each command was sent at any time between two rows. So its moment has the standard deviation of
-    a row over sqrt(12), and a reading that of the change between the first and the last moment.
-    """
+    """A slow log with the variance of commands sent at any time between two rows."""
     if not log.seen_within:
         return log
     early, late = (predictor.readings(log.sent(by * log.seen_within), {}, {}) for by in (-0.5, 0.5))
@@ -262,7 +251,11 @@ def _timed(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
 
 
 def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
-    options = [_begun(c, log.motion.time[0]) for c in log.commands]
+    begin = log.motion.time[0]
+    options = [  # as they are, and with the first pulse switched on when the log starts
+        [sent, [(begin, sent[0][1]), *sent[1:]]] if sent and np.isinf(sent[0][0]) else [sent]
+        for sent in log.commands
+    ]
     trials = [replace(log, commands=(e, r)) for e in options[0] for r in options[1]]
     if len(trials) == 1:
         return log
@@ -274,10 +267,3 @@ def _settled(log: BenchLog, predictor: BenchPredictor) -> BenchLog:
         return float(np.mean(np.abs(r[early])))
 
     return min(trials, key=cost)
-
-
-def _begun(intervals: list[tuple[float, float]], start: float) -> list[list[tuple[float, float]]]:
-    """The pulses as they are, and with the first one switched on when the log starts."""
-    if not intervals or np.isfinite(intervals[0][0]):
-        return [intervals]
-    return [intervals, [(start, intervals[0][1]), *intervals[1:]]]

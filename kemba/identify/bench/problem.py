@@ -27,7 +27,7 @@ from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
 from kemba.identify.problem.missing_force import dahl, end_terms, missing_along
 from kemba.identify.problem.noise import ColouredProblem, colours, whiten
-from kemba.identify.problem.types import (
+from kemba.identify.problem.problem import (
     Array,
     Changes,
     ForceChannel,
@@ -116,7 +116,10 @@ class BenchProblem(ColouredProblem):
         logs, self.drift = tuple(runs), drift
         self.model = model
         self.runs = tuple(log.name for log in logs)
-        self.candidates = effect_candidates(model) | sensor_candidates(_sensor_sigmas(logs), model)
+        median = {"piston/F": [log.sigma["piston/F"] for log in logs],
+                  "piston/x": [log.motion.x_sigma for log in logs]}  # fmt: skip
+        sigmas = {channel: float(np.median(values)) for channel, values in median.items()}
+        self.candidates = effect_candidates(model) | sensor_candidates(sigmas, model)
         row = max(log.seen_within for log in logs)
         hidden = {
             n: c for n, c in self.candidates.items() if c.lead.unit == "s" and c.lead.size < row
@@ -274,8 +277,7 @@ class BenchProblem(ColouredProblem):
         return dict(zip(parts, self.whiten(columns).T, strict=True))
 
     def _along(self, theta: Theta, index: int) -> tuple[SmoothedMotion, Array, float]:
-        """Of one log: the motion without the position sensor's faults, the share (n, 2) of each
-        sample's neighbourhood in which the valves act, the stroke [m]."""
+        """Of one log: true motion, share (n, 2) of each valve acting by then, stroke [m]."""
         log, predictor = self.logs[index], self.predictor
         acting = predictor.acting(log, theta)
         return predictor.true_motion(log, theta), acting, self.model.mechanism.stroke
@@ -299,8 +301,7 @@ class BenchProblem(ColouredProblem):
         return Leftover(residual, columns, run)
 
     def _imperfection(self, index: int) -> Array:
-        """Spread (n,) of the force residual, in noise units, when every effect of the catalogue may
-        be there with a small share of its size."""
+        """Spread (n,), in noise units, of the force if every effect may be there a little."""
         base = self.standardised({}, index)[FORCE]
         power, spike = np.ones(len(base)), SpikeSlabSettings.spike
         for c in self.candidates.values():
@@ -368,10 +369,3 @@ def bench_problem(logs: Sequence[Trajectory], model: Model) -> BenchProblem:
     return BenchProblem(
         [clocks.without_drift(run, *drift) for run in runs(logs)], model, drift=drift
     )
-
-
-def _sensor_sigmas(logs: Sequence[BenchLog]) -> dict[str, float]:
-    """Noise (1 sigma) of the force [N] and of the position [m], the median over the logs."""
-    force = float(np.median([log.sigma["piston/F"] for log in logs]))
-    position = float(np.median([log.motion.x_sigma for log in logs]))
-    return {"piston/F": force, "piston/x": position}

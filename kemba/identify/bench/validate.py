@@ -12,7 +12,7 @@ from kemba.effects.pneumatics.switching import Pulse, inverted
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog, SmoothedMotion
 from kemba.identify.infer.windows import rms
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 
 Predict = Callable[[BenchLog], Array]  # the nominal force along a run
 BETTER = 4.0  # factor by which a mix-up must fit better
@@ -121,8 +121,7 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
 
 
 def _left(run: BenchLog, predict: Predict) -> Left:
-    """What may be wrong with the force, and what is left with that put right. Nothing where a
-    mix-up leads the model to no prediction, as to a negative volume."""
+    """What may be wrong with the force, and what is left without; {} where nothing is predicted."""
     force, found = run.measured["piston/F"][run.keep["piston/F"]], {}
     with np.errstate(over="ignore", invalid="ignore"):  # a mix-up may lead anywhere
         try:
@@ -145,8 +144,7 @@ def _spread(force: Array) -> float:
 
 
 def _zero(run: BenchLog, texts: Texts, left: float, stroke: float, predict: Predict) -> str:
-    """The zero beside the extended end without which much less is `left`, in words; `texts`: what
-    is wrong with the force."""
+    """The zero beside the extended end without which much less is `left`, in words."""
 
     def error(zero: float) -> float:
         motion = replace(run.motion, x=run.motion.x + zero)

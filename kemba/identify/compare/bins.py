@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc  # importing scipy.stats takes half a second
 
 from kemba.identify.infer.windows import codes, rms
-from kemba.identify.problem.types import Array, Labels, Rows, Texts
+from kemba.identify.problem.problem import Array, Labels, Rows, Texts
 
 
 def false_discoveries(chances: Sequence[float] | Array) -> Array:

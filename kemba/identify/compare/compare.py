@@ -11,18 +11,16 @@ from kemba.identify.compare.bins import BinSettings, ConditionBin, condition_bin
 from kemba.identify.compare.force_profiles import ForceProfile, force_profiles
 from kemba.identify.compare.hints import (
     Hint,
-    Tolerant,
+    after_commands,
     conflicts,
     lacking,
-    lagged,
     slopes,
     within_tolerance,
 )
 from kemba.identify.compare.words import place_of
 from kemba.identify.infer.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.missing_force import Peak, peaks
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, MissingForce, Rows, Texts, Theta
+from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
 from kemba.units import short
 
 FAIR = 1.5  # error ratio below which it nearly explains them
@@ -108,11 +106,11 @@ def compare(
     window = aggregation_windows(problem, rows, region)
     sums = window.sums(r)
     known = slopes(problem, start)
-    responses = lagged(problem, rows, r / np.sqrt(problem.expected_power()))
+    sent = after_commands(problem, rows, r / np.sqrt(problem.expected_power()))
     forces = tuple(force_profiles(problem, r))
-    sent = [s.hint for s in responses if s.certain]
-    tolerant = within_tolerance(r, known)
-    ratio, clean = _tolerant(rows, region, window, tolerant)
+    left, q_value = within_tolerance(r, known)
+    ratio, clean = _tolerant(rows, region, window, left)
+    clean = clean and q_value >= BinSettings.false_discoveries
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
@@ -120,7 +118,7 @@ def compare(
         tuple(_channels(problem, rows, r, window, start)),
         tuple(condition_bins(rows, region, window.first, sums)),
         ratio,
-        clean and not any(profile.matters for profile in force_profiles(problem, tolerant.left)),
+        clean and not any(profile.matters for profile in force_profiles(problem, left)),
         (*sent, *conflicts(rows, r, known)),
         forces,
         tuple(problem.missing_force(start)),
@@ -139,51 +137,36 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
     return list(condition_bins(rows, region, window.first, window.sums(r)))
 
 
-def _tolerant(rows: Rows, region: Texts, window: Windows, found: Tolerant) -> tuple[float, bool]:
-    """Error ratio of what the figures' tolerance leaves; whether it is within the noise, under each
-    condition nearly so, and the figures are not too far off. One condition of many may be a little
-    worse by chance."""
-    if found.q_value < BinSettings.false_discoveries:
-        return rms(window.sums(found.left)), False
-    sums = window.sums(found.left)
+def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:
+    """Error ratio of what tolerances leave; whether it is within the noise nearly everywhere."""
+    sums = window.sums(left)
     bins = condition_bins(rows, region, window.first, sums)
     clean = not any(c.significant and c.ratio > FAIR for c in bins)
     return rms(sums), clean and rms(sums) <= BinSettings.tolerated
 
 
-def _measured_units(rows: Rows) -> dict[str, str]:
-    """Header of every measured channel: those with a place in a log."""
-    units = {"x": "m", "z": "m", "q": "rad", "pitch": "rad", "F": "N", "P": "Pa"}
-    found = {}
-    for name in rows.channels:
-        last = name.rsplit("/", 1)[-1]
-        if name in rows.units or ("/foot/" not in name and last in units):
-            found[name] = f"{name} [{rows.units.get(name) or units[last]}]"
-    return found
+UNITS = {"x": "m", "z": "m", "q": "rad", "pitch": "rad", "F": "N", "P": "Pa"}  # by a name's end
 
 
 def _channels(
     problem: Problem, rows: Rows, r: Array, window: Windows, start: Theta
 ) -> Iterable[ChannelError]:
-    errors = problem.window_errors(start)
-    sums = window.sums(r)
-    headers = _measured_units(rows)
+    """Errors of every measured channel: those with a place in a log."""
+    errors, sums = problem.window_errors(start), window.sums(r)
     for k, channel in enumerate(rows.channels):
-        own = rows.channel == k
-        if channel not in headers or not own.any():
+        own, unit = rows.channel == k, rows.units.get(channel)
+        if unit is None and "/foot/" not in channel:
+            unit = UNITS.get(channel.rsplit("/", 1)[-1])
+        if unit is None or not own.any():
             continue
         error = errors.get(channel, r[own] * rows.sigma[own])
         yield ChannelError(
-            headers[channel],
+            f"{channel} [{unit}]",
             float(np.sqrt(np.mean(error**2))),
             float(np.max(np.abs(error))),
             float(np.median(rows.sigma[own])),
             rms(sums[own[window.first]]),
         )
-
-
-def _first(hints: Sequence[Hint], kind: str) -> Sequence[Hint]:
-    return [hint for hint in hints if hint.kind == kind][:1]
 
 
 def phrase(found: Comparison) -> str:
@@ -202,10 +185,7 @@ def phrase(found: Comparison) -> str:
             f"The model's error is {ratio}; {worst}; but its nominal figures may be off by as much "
             f"as is usual, and then it would be {short(found.tolerant_ratio)} times."
         )
-    hints = [h for kind in ("law", "command", "conflict") for h in _first(found.hints, kind)]
-    parts = [
-        f"The model {found.grade} the logs: its error is {ratio}",
-        worst,
-        *(h.text for h in hints),
-    ]
-    return "; ".join(parts) + "."
+    first = {hint.kind: hint.text for hint in reversed(found.hints)}
+    hints = [first[kind] for kind in ("law", "command", "conflict") if kind in first]
+    told = f"The model {found.grade} the logs: its error is {ratio}"
+    return "; ".join([told, worst, *hints]) + "."

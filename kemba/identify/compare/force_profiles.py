@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Flags, ForceChannel
+from kemba.identify.problem.problem import Array, ForceChannel, Problem
 from kemba.units import short
 
 
@@ -80,28 +79,28 @@ def force_profiles(problem: Problem, residual: Array) -> list[ForceProfile]:
 
     `residual` (n,): whitened.
     """
-    found = [
-        [p for p in _of(channel, residual) if p is not None] for channel in problem.force_channels()
-    ]
+    found = []
+    for channel in problem.force_channels():
+        by_value = (_force_profile(channel, label, residual) for label in channel.quantities)
+        own = [profile for profile in by_value if profile is not None]
+        for name, rise in channel.after.items():
+            late = 1e3 * middle(lags())
+            own.append(_solved(channel, f"after {name} [ms]", late, rise, residual))
+        found.append(own)
     found = [group for group in found if group]
     found.sort(key=lambda group: -max(p.gain for p in group))
     return [p for group in found for p in group]
 
 
-def _of(channel: ForceChannel, residual: Array) -> list[ForceProfile | None]:
-    by_value = [_force_profile(channel, label, residual) for label in channel.quantities]
-    return by_value + [_solved(channel, f"after {n} [ms]", 1e3 * middle(lags()), rise, residual)
-                       for n, rise in channel.after.items()]  # fmt: skip
-
-
 def _force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceProfile | None:
-    """The missing force of a channel by bins of the quantity `label`, fitted to `residual` (n,);
-    None where the quantity hardly varies."""
+    """The missing force by bins of the quantity `label`; None where that hardly varies."""
     values = channel.quantities[label]
     edges = bins(values)
     if edges is None:
         return None
-    flags = _flags(values, edges)
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+    place = np.where(np.isfinite(values), place, -1)
+    flags = np.asarray(place[..., None] == np.arange(len(edges) - 1))
     sides = flags.reshape(-1, flags.shape[-1])
     centre = np.array([float(np.median(values.ravel()[own])) for own in sides.T])
     return _solved(channel, label, centre, flags.astype(float), residual)
@@ -157,9 +156,3 @@ def bins(values: Array) -> Array | None:
             kept.append(float(edge))
     kept.append(float(edges[-1]))
     return np.array(kept) if len(kept) > 2 and narrowest > 0 else None
-
-
-def _flags(values: Array, edges: Array) -> Flags:
-    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
-    place = np.where(np.isfinite(values), place, -1)
-    return np.asarray(place[..., None] == np.arange(len(edges) - 1))

@@ -18,8 +18,7 @@ from kemba.identify.compare.force_profiles import (
 from kemba.identify.compare.words import command, quantity
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
 from kemba.identify.infer.windows import codes
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Changes, Labels, Rows, Theta
+from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Rows, Theta
 
 
 @dataclass(frozen=True)
@@ -46,20 +45,10 @@ def slopes(problem: Problem, at: Theta) -> Slopes:
     return Slopes(leads, jacobian[:, : len(leads)], jacobian[:, len(leads) :])
 
 
-@dataclass(frozen=True)
-class Tolerant:
-    """What is left when the model is as good as models are.
-
-    `left` (n,): the residual. `q_value`: of the figure or absent effect that is farthest off; it
-    controls false discoveries over all of them.
-    """
-
-    left: Array
-    q_value: float
-
-
-def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
-    """The likeliest explanation of a residual (n,) by a model that lacks nothing.
+def within_tolerance(residual: Array, known: Slopes) -> tuple[Array, float]:
+    """The likeliest explanation of a residual (n,) by a model that lacks nothing: what it leaves
+    (n,), and the q value of the figure or absent effect that is farthest off, which controls false
+    discoveries over all of them.
 
     Each nuisance parameter is off by about its prior sigma, and each absent effect is there with a
     small share of its size, as under every hypothesis of `discover`. The likeliest values, in units
@@ -70,7 +59,7 @@ def within_tolerance(residual: Array, known: Slopes) -> Tolerant:
     h = columns.T @ columns + np.eye(columns.shape[1])
     off = -np.linalg.solve(h, columns.T @ residual)
     q = false_discoveries(2.0 * ndtr(-np.abs(off))) if len(off) else np.ones(1)
-    return Tolerant(residual + columns @ off, float(q.min()))
+    return residual + columns @ off, float(q.min())
 
 
 CERTAIN = 1e-4  # p-value below which a hint is certain, over all that were tried
@@ -91,96 +80,55 @@ class Hint:
     weight: float
 
 
-@dataclass(frozen=True)
-class Response:
-    """Cross-correlation of a channel's error with the changes of a command before it.
-
-    `z` (k,): z score per `lag` (k,) [s]. `tests`: how many were tried to find this one.
-    """
-
-    channel: str
-    command: str
-    lag: Array
-    z: Array
-    tests: int
-
-    @property
-    def peak(self) -> int:
-        return int(np.argmax(np.abs(self.z)))
-
-    @property
-    def certain(self) -> bool:
-        return bool(np.abs(self.z[self.peak]) > -ndtri(CERTAIN / (2 * self.tests)))
-
-    @property
-    def hint(self) -> Hint:
-        late = f"{self.lag[self.peak] * 1e3:.0f} ms after {command(self.command)}"
-        verb = "switches" if "valve/" in self.command else "changes"
-        what = f"the prediction of {quantity(self.channel)} goes wrong {late} {verb}"
-        return Hint("command", what, float(abs(self.z[self.peak])))
-
-
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it explains enough."""
     plain = ForceProfileSettings.plain
     best = max(found, key=lambda profile: profile.gain, default=None)
-    return (
-        [Hint("law", str(best), best.gain)] if best and best.gain > plain and best.largest else []
-    )
+    if best is None or best.gain <= plain or not best.largest:
+        return []
+    return [Hint("law", str(best), best.gain)]
 
 
-def lagged(problem: Problem, rows: Rows, white: Array) -> list[Response]:
-    """For every command the channel whose error follows its changes most clearly, the clearest
-    command first.
+def after_commands(problem: Problem, rows: Rows, white: Array) -> list[Hint]:
+    """For every command the channel whose error follows its changes most clearly, where that is
+    certain; the clearest first.
 
-    `white` (n,): residual with unit variance where the model is right.
+    `white` (n,): residual with unit variance where the model is right. A command's rise within each
+    lag is the regressor of every channel's error.
     """
-    runs = problem.commands()
+    runs, found = problem.commands(), []
     names = sorted({n for run in runs for n in run})
-    found = [_strongest(rows, white, runs, name, len(names)) for name in names]
-    return sorted(found, key=lambda s: -abs(s.z[s.peak]))
-
-
-def _strongest(
-    rows: Rows, white: Array, runs: Sequence[Changes], name: str, commands: int
-) -> Response:
-    """A command's rise within each lag, as a regressor of every channel's error."""
-    rise = np.zeros((len(rows), len(lags()) - 1))
-    for i, changes in enumerate(runs):
-        if name in changes:
-            own = rows.run == i
-            rise[own] = risen(*changes[name], rows.time[own])
-    best, tests = None, commands * len(rows.channels)
-    for k, channel in enumerate(rows.channels):
-        own = rows.channel == k
-        power = np.sum(rise[own] ** 2, axis=0)
-        z = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
-        z = np.where(power > 1e-9 * np.max(power, initial=1e-12), z, 0.0)
-        this = Response(channel, name, middle(lags()), z, tests)
-        if best is None or np.max(np.abs(z)) > np.max(np.abs(best.z)):
-            best = this
-    assert best is not None
-    return best
+    for name in names:
+        rise = np.zeros((len(rows), len(lags()) - 1))
+        for i, changes in enumerate(runs):
+            if name in changes:
+                own = rows.run == i
+                rise[own] = risen(*changes[name], rows.time[own])
+        z = np.zeros((len(rows.channels), rise.shape[1]))
+        for k in range(len(z)):
+            own = rows.channel == k
+            power = np.sum(rise[own] ** 2, axis=0)
+            score = white[own] @ rise[own] / np.sqrt(np.maximum(power, 1e-12)) / DEPENDENT
+            z[k] = np.where(power > 1e-9 * np.max(power, initial=1e-12), score, 0.0)
+        k, lag = divmod(int(np.argmax(np.abs(z))), z.shape[1])
+        if abs(z[k, lag]) > -ndtri(CERTAIN / (2 * len(names) * len(z))):
+            late = f"{middle(lags())[lag] * 1e3:.0f} ms after {command(name)}"
+            verb = "switches" if "valve/" in name else "changes"
+            what = f"the prediction of {quantity(rows.channels[k])} goes wrong {late} {verb}"
+            found.append(Hint("command", what, float(abs(z[k, lag]))))
+    return sorted(found, key=lambda hint: -hint.weight)
 
 
 def conflicts(rows: Rows, r: Array, known: Slopes) -> list[Hint]:
     """Parameters whose best values differ by more than their error allows, from run to run or from
     one valve mode to another; the clearest first. `r` (n,): the residual."""
-    groups = {"all runs": rows.run, "all positions of the valves": codes(rows.mode)}
-    found = [
-        hint
-        for text, group in groups.items()
-        for hint in _wandering(r, known, np.asarray(group), text)
-    ]
+    valves = _wandering(r, known, codes(rows.mode), "all positions of the valves")
+    found = [*_wandering(r, known, rows.run, "all runs"), *valves]
     return sorted(found, key=lambda h: -h.weight)
 
 
 def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hint]:
-    """Each effect's switch with one value per group against one value for all.
-
-    `group` (n,): group of each row. The nuisance parameters are free within their priors, and the
-    same in all groups.
-    """
+    """Each effect's switch with one value per `group` (n,) of rows against one value for all."""
     parts = [group == i for i in np.unique(group)]
     by_part = [(known.by_lead[own], known.by_nuisance[own], r[own]) for own in parts]
     power = np.stack([np.sum(j * j, axis=0) for j, _, _ in by_part])
@@ -200,12 +148,7 @@ def _wandering(r: Array, known: Slopes, group: Labels, text: str) -> Iterable[Hi
 
 
 def _agreement(information: Array, pull: Array) -> float:
-    """p value of one value for all groups.
-
-    `information` (g, g) on a value for each group; `pull` (g,): slope of the log likelihood where
-    all values are zero. No model is exact: each group's value may be off by the share of its size
-    that the spike of the prior allows.
-    """
+    """p value of one value for all groups, from `information` (g, g) and `pull` (g,) at zero."""
     if len(pull) < 2:
         return 1.0
     imperfect = SpikeSlabSettings.spike

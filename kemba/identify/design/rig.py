@@ -25,15 +25,18 @@ from kemba.identify.bench.problem import BenchProblem
 from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
+    JudgedTest,
+    Proposal,
     Rivals,
     Separation,
+    best_fit,
     contenders,
-    evidence,
+    misfit,
     separation,
     strength,
 )
 from kemba.identify.problem.noise import Colour, learn
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.rigs import CourseRig, DynamometerRig, LockedRig, RandomRig, Rig, Test
@@ -77,15 +80,6 @@ def _with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
     return found
 
 
-def as_predicted(problem: BenchProblem, theta: Theta) -> BenchProblem:
-    """The problem of logs in which everything is as the model at theta has it."""
-    logs = []
-    for i, log in enumerate(problem.logs):
-        readings = problem.readings(theta, i)
-        logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
-    return _with_logs(problem, logs)
-
-
 def log_time(rig: Rig, stroke: float) -> float:
     """Seconds of log of the tests that are judged."""
     tests: Iterable[Test] = rig.tests(np.random.default_rng(0), stroke)
@@ -111,8 +105,7 @@ def _virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
 
 
 def _colour(rows: float) -> Colour:
-    """Colour of white noise of the force sensor and of what no model explains, in units of the
-    former."""
+    """Colour of the sensor's white noise with what no model explains, in units of the former."""
     settings, rng = ExperimentSettings, np.random.default_rng(0)
     keep = float(np.exp(-1.0 / (rows * settings.memory)))
     slow = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.standard_normal(settings.sample))
@@ -120,47 +113,35 @@ def _colour(rows: float) -> Colour:
     return learn(rng.standard_normal(settings.sample) + share * slow)
 
 
-@dataclass(frozen=True)
-class JudgedRig:
-    """A rig, the evidence that its tests are expected to give, and the seconds of its logs."""
-
-    rig: Rig
-    evidence: Separation
-    log_s: float
-
-    @property
-    def pace(self) -> float:
-        """Expected evidence [nats] per second of log."""
-        return self.evidence.least / self.log_s
-
-
 def _menu(stroke: float) -> list[Rig]:
     """Standard tests of one piston of this stroke [m]."""
-    modes = ("extend", "retract", "both", "none")
-    slow = DynamometerRig.model_validate(
-        {"name": "slow_stroke", "speeds": {m: [0.02, 0.05] for m in modes}}
-    )
-    fast = DynamometerRig.model_validate(
-        {"name": "dynamometer", "speeds": {m: [0.1, 0.3, 0.6, 1.0] for m in modes}}
-    )
-    both_ends = {"positions": [0.0, stroke / 2, stroke]}
+    modes, ends = ("extend", "retract", "both", "none"), [0.0, stroke / 2, stroke]
+
+    def locked(chamber: str) -> Rig:
+        asked = {"name": f"locked_{chamber}", "chamber": chamber, "positions": ends}
+        return LockedRig.model_validate(asked)
+
+    def strokes(name: str, *speeds: float) -> Rig:
+        asked = {"name": name, "speeds": {mode: list(speeds) for mode in modes}}
+        return DynamometerRig.model_validate(asked)
+
     return [
-        LockedRig.model_validate({"name": "locked_extend", "chamber": "extend", **both_ends}),
-        LockedRig.model_validate({"name": "locked_retract", "chamber": "retract", **both_ends}),
-        slow,
-        fast,
+        locked("extend"),
+        locked("retract"),
+        strokes("slow_stroke", 0.02, 0.05),
+        strokes("dynamometer", 0.1, 0.3, 0.6, 1.0),
         RandomRig.model_validate({"name": "random", "duration": 4.0}),
         RandomRig.model_validate({"name": "random_fast", "duration": 4.0, "speed": 1.2}),
     ]
 
 
-def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedRig]:
+def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedTest]:
     """Every standard test; none where a rig cannot show two of the rivals."""
     for rig in _menu(bench.stroke):
         found = separation(bench.problem(rig), rivals)
         if found is None:
             return
-        yield JudgedRig(rig, found, log_time(rig, bench.stroke))
+        yield JudgedTest(rig, found, log_time(rig, bench.stroke))
 
 
 class RigCourseSettings:
@@ -182,12 +163,6 @@ class RigCourseSettings:
 STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends at rest, by its mean
 
 
-def dimensions() -> int:
-    """Numbers that a course is made of: its places, twice the pulses of each valve, its laps."""
-    settings = RigCourseSettings
-    return settings.places + 4 * settings.pulses + 1
-
-
 def course(point: Array, duration: float, stroke: float) -> CourseRig:
     """The course of a point (k,) of the unit cube, which lasts `duration` [s]."""
     settings = RigCourseSettings
@@ -196,30 +171,22 @@ def course(point: Array, duration: float, stroke: float) -> CourseRig:
     every = duration / (laps * (count - 1))
     first, second = np.split(point[count:-1], 2)
     way = np.append(np.tile(point[: count - 1], laps), point[count - 1]) * stroke
-    places = _reachable(way, settings.fastest * every / STEEPEST)
+    reach, places = settings.fastest * every / STEEPEST, [float(way[0])]
+    for x in way[1:]:
+        places.append(float(np.clip(x, places[-1] - reach, places[-1] + reach)))
     return CourseRig(
         name="designed",
-        places=tuple(round(float(x), 5) for x in places),
+        places=tuple(round(x, 5) for x in places),
         every=every,
         extend=_spans(first, duration, pulses, settings.dwell),
         retract=_spans(second, duration, pulses, settings.dwell),
     )
 
 
-def _reachable(places: Array, reach: float) -> Array:
-    """Places (k,), each within `reach` of the one before."""
-    found = [float(places[0])]
-    for x in places[1:]:
-        found.append(float(np.clip(x, found[-1] - reach, found[-1] + reach)))
-    return np.array(found)
-
-
 def _spans(
     weights: Array, duration: float, pulses: int, dwell: float
 ) -> tuple[tuple[float, float], ...]:
-    """Spans in which a valve is on: `weights` (2 pulses,) share the time among breaks and pulses,
-    each of which lasts at least `dwell` [s] where the time suffices; the last break takes a mean
-    share."""
+    """Spans in which a valve is on: `weights` (2 pulses,) share the time, `dwell` [s] at least."""
     weights = np.append(weights, 0.5) + 1e-3
     dwell = min(dwell, 0.5 * duration / len(weights))
     parts = dwell + weights / weights.sum() * (duration - dwell * len(weights))
@@ -233,14 +200,12 @@ def beginnings(count: int, seed: int) -> Array:
     settings = RigCourseSettings
     plain = np.array(list(_plain(settings.places, settings.pulses)))
     more = max(count - len(plain), 1)
-    even = qmc.Sobol(dimensions(), rng=seed).random_base2(int(np.ceil(np.log2(more))))
+    even = qmc.Sobol(plain.shape[1], rng=seed).random_base2(int(np.ceil(np.log2(more))))
     return np.asarray(np.vstack([plain, even])[:count])
 
 
 def _plain(places: int, pulses: int) -> Iterator[Array]:
-    """Courses that a person would think of: a rod at rest, one slow stroke, strokes to and fro;
-    each with the valves in turn, and
-    several times with both of them together."""
+    """A rod at rest, a slow stroke, strokes to and fro, each with valves in turn and together."""
     ways = [
         np.full(places, 0.5),
         np.linspace(0.05, 0.95, places),
@@ -258,27 +223,18 @@ def _best_point(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> tuple[Array, int]:
-    """The point (k,) of the unit cube that is worth most, as far as a bounded search finds it, and
-    how many were tried.
-
-    `begin` (m, k): the first points that are tried. `bounded`: stop when the time is over; without
-    it the answer depends on nothing but the seed.
-    """
+    """The point (k,) of the unit cube worth most in a search from `begin` (m, k); tries."""
     settings, started = DesignSearchSettings, time.monotonic()
     seen: list[tuple[float, Array]] = []
 
     def cost(point: Array) -> float:
-        over = bounded and time.monotonic() - started > settings.budget
-        if over and seen:
+        if seen and bounded and time.monotonic() - started > settings.budget:
             return 0.0
         value = worth(np.asarray(point))
         seen.append((value if np.isfinite(value) else 0.0, np.array(point)))
-        return -seen[-1][0]
-
-    def report(best: Array, convergence: float) -> bool:
         top = max(value for value, _ in seen)
         say(f"{len(seen)} tests tried; the best is worth {top:.2f}")
-        return bounded and time.monotonic() - started > settings.budget
+        return -seen[-1][0]
 
     differential_evolution(
         cost,
@@ -288,76 +244,48 @@ def _best_point(
         rng=np.random.default_rng(settings.seed),
         polish=False,
         tol=0.0,
-        callback=report,
     )
     return max(seen, key=lambda item: item[0])[1], len(seen)
 
 
 @dataclass(frozen=True)
-class RigDesign:
-    """The best standard test and the designed one; `chosen` is the one to be done."""
-
-    standard: JudgedRig
-    designed: JudgedRig
-    tried: int
+class RigDesign(Proposal):
+    """A proposal of rigs; `chosen` is the one to be done."""
 
     @property
-    def chosen(self) -> JudgedRig:
+    def chosen(self) -> JudgedTest:
         """The designed test, except where only the standard one settles the question."""
         clear = ExperimentSettings.clear
         least, other = self.designed.evidence.least, self.standard.evidence.least
         return self.standard if least < min(clear, other) else self.designed
 
     @property
-    def rig(self) -> Rig:
-        """What the test does."""
-        return self.chosen.rig
-
-    @property
-    def nats(self) -> float:
-        """Expected evidence [nats] between the two effects that are hardest to separate."""
-        return self.chosen.evidence.least
-
-    @property
-    def rivals(self) -> tuple[str, str]:
-        """These two effects."""
-        return self.chosen.evidence.first, self.chosen.evidence.nearest
-
-    @property
     def sentence(self) -> str:
         """What the test gains, in words."""
-        first, second = self.rivals
-        chosen, standard = self.chosen, self.standard
+        chosen, standard, (first, second) = self.chosen, self.standard, self.pair
         word, length = strength(self.nats), f"{chosen.log_s:.2g} s of log"
         if self.nats < ExperimentSettings.clear:
             return (
                 f"No test of a rig that was tried separates {first} from {second}: the best, "
-                f"'{chosen.rig.name}' ({length}), is expected to give {word} evidence."
+                f"'{chosen.test.name}' ({length}), is expected to give {word} evidence."
             )
         text = (
-            f"The test '{chosen.rig.name}' ({length}) separates {first} from {second}: {word} "
+            f"The test '{chosen.test.name}' ({length}) separates {first} from {second}: {word} "
             "evidence is expected"
         )
         if chosen is standard:
             return f"{text}; no shorter test that was tried gives as much."
-        other = f"the best standard test, '{standard.rig.name}' ({standard.log_s:.2g} s)"
+        other = f"the best standard test, '{standard.test.name}' ({standard.log_s:.2g} s)"
         if standard.evidence.least < 1.0:
             return f"{text}; {other}, gives almost none."
         return f"{text}, {chosen.pace / standard.pace:.2g} times as much per second as {other}."
 
     def json(self) -> dict[str, Any]:
-        """The figures behind the sentence; `designed` and `standard` have the same keys."""
-        return {
-            "rig": self.rig.name,
-            "nats": self.nats,
-            "rivals": self.rivals,
-            "sentence": self.sentence,
-            "strength": strength(self.nats),
-            "log_s": self.chosen.log_s,
-            "designed": _figures(self.designed),
-            "standard": _figures(self.standard),
-            "tried": self.tried,
-        }
+        """The same with the names of the rigs."""
+        found = {"rig": self.chosen.test.name, **super().json()}
+        for side, judged in (("designed", self.designed), ("standard", self.standard)):
+            found[side] = {"rig": judged.test.name, **found[side]}
+        return found
 
 
 def design_rig_test(
@@ -390,20 +318,24 @@ def design_rig_test(
     point, tried = _best_point(worth, beginnings(search.members, search.seed), say, bounded)
     rig = course(point, duration, bench.stroke)
     say("fitting the rivals to what the tests would measure")
-    before, after = (_confirmed(bench, r, rivals) for r in (standard.rig, rig))
+    before, after = (_confirmed(bench, r, rivals) for r in (standard.test, rig))
     return RigDesign(before, after, tried)
 
 
-def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedRig:
+def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedTest:
     """A test, its evidence between the nearest rivals by a fit in place of slopes."""
     problem = bench.problem(rig)
     straight = separation(problem, rivals)
     assert straight is not None
     first, nearest = straight.first, straight.nearest
-    logs = as_predicted(problem, rivals.theta(first))
-    fitted = evidence(logs, rivals, nearest)
+    logs = []  # in which everything is as the first rival has it
+    for i, log in enumerate(problem.logs):
+        readings = problem.readings(rivals.theta(first), i)
+        logs.append(replace(log, measured={c: y for c, (y, _) in readings.items()}))
+    exact = _with_logs(problem, logs)
+    fitted = misfit(exact, best_fit(exact, rivals, nearest))
     nats = {**straight.nats, nearest: min(fitted, straight.least)}
-    return JudgedRig(rig, Separation(first, nats), log_time(rig, bench.stroke))
+    return JudgedTest(rig, Separation(first, nats), log_time(rig, bench.stroke))
 
 
 def propose(
@@ -428,11 +360,7 @@ def propose(
     if found is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no rig test shows a difference between {names}")
-    rig = {"kind": found.rig.kind, **found.rig.model_dump(mode="json", exclude_defaults=True)}  # type: ignore[attr-defined]
+    chosen = found.chosen.test
+    rig = {"kind": chosen.kind, **chosen.model_dump(mode="json", exclude_defaults=True)}
     dump_yaml({"rig": {**rig, "notes": found.sentence}}, out)
     return found
-
-
-def _figures(judged: JudgedRig) -> dict[str, Any]:
-    """Name of a test, and what it is expected to give."""
-    return {"rig": judged.rig.name, **judged.evidence.json(judged.log_s)}

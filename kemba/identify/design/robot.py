@@ -8,12 +8,13 @@ times, and planning finds the torques.
 
 import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.stats import qmc
 
 from kemba.config import dump_yaml
 from kemba.effects.mechanics.hip import Motor
@@ -22,13 +23,15 @@ from kemba.identify.answer import read_answer
 from kemba.identify.design.separation import (
     DesignSearchSettings,
     ExperimentSettings,
+    JudgedTest,
+    Proposal,
     Rivals,
     Separation,
     contenders,
     separation,
     strength,
 )
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.robot.problem import robot_problem
 from kemba.model.model import Model
 from kemba.model.spec import load_model
@@ -145,22 +148,11 @@ STANDARD = Sway(angle=0.1, leans=2, duration=0.9, pace=1.0)
 
 
 @dataclass(frozen=True)
-class Tried:
-    """A sway as it was simulated, with its expected evidence and the seconds of its log."""
+class Tried(JudgedTest):
+    """A sway as it was simulated."""
 
-    sway: Sway
+    test: Sway
     done: Trajectory
-    evidence: Separation
-
-    @property
-    def log_s(self) -> float:
-        """Seconds of log, the rest before it included."""
-        return float(self.done.time[-1] - self.done.time[0])
-
-    @property
-    def pace(self) -> float:
-        """Expected evidence [nats] per second of log."""
-        return self.evidence.least / self.log_s
 
 
 def _design_motion(
@@ -169,12 +161,7 @@ def _design_motion(
     say: Callable[[str], None] = lambda text: None,
     bounded: bool = True,
 ) -> tuple[Tried, list[Tried], int] | None:
-    """The standard sway, those that tell the rivals apart best, and how many were simulated;
-    `bounded`: in about a minute.
-
-    None where logs of a robot cannot show two of the rivals. Raises KembaError where the robot has
-    one leg, or none of the sways is safe.
-    """
+    """The standard sway, all safe ones, the best first, and how many were simulated."""
     if len(model.mechanism.legs) < 2:
         raise KembaError(model.name, "stands on one leg; no safe motion is known for it")
     settings, search = SwaySettings, DesignSearchSettings
@@ -182,9 +169,19 @@ def _design_motion(
     found: list[Tried] = []
     standard: Tried | None = None
     height = float(model.mechanism.standing["body/z"])
-    for sway in _sways(settings.tried, search.seed, height, lambda: found):
+    rng, even = np.random.default_rng(search.seed), max((2 * settings.tried) // 3, 1)
+    cube = qmc.Sobol(4, rng=search.seed).random_base2(int(np.ceil(np.log2(even))))
+    points = {STANDARD: np.full(4, 0.5)}
+    while count < settings.tried:  # the standard, some that fill the range, some near the best
         if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
             break
+        if count <= even:
+            point = cube[count - 1]
+        else:
+            near = points[found[0].test] if found else np.full(4, 0.5)
+            point = np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0)
+        sway = _sway(point, height) if count else STANDARD
+        points.setdefault(sway, point)
         count += 1
         tried = try_out(model, sway, rivals)
         if tried is None:
@@ -209,7 +206,8 @@ def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
         return None
     if not safe(model, done):
         return None
-    return Tried(sway, done, expected(model, done, rivals))
+    log_s = float(done.time[-1] - done.time[0])  # the rest before it included
+    return Tried(sway, expected(model, done, rivals), log_s, done)
 
 
 def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
@@ -236,25 +234,8 @@ def safe(model: Model, done: Trajectory) -> bool:
     return True
 
 
-def _sways(count: int, seed: int, height: float, best: Callable[[], list[Tried]]) -> Iterator[Sway]:
-    """The standard sway, then some that fill the range evenly, then some near the best."""
-    from scipy.stats import qmc
-
-    rng = np.random.default_rng(seed)
-    even = max((2 * count) // 3, 1)
-    points = qmc.Sobol(4, rng=seed).random_base2(int(np.ceil(np.log2(even))))
-    yield STANDARD
-    for point in points[:even]:
-        yield _sway(point, height)
-    for _ in range(count - even - 1):
-        found = best()
-        near = _point(found[0].sway) if found else np.full(4, 0.5)
-        yield _sway(np.clip(near + 0.15 * rng.standard_normal(4), 0.0, 1.0), height)
-
-
 def _sway(point: Array, height: float) -> Sway:
-    """The sway of a point (4,) of the unit cube, of hips at this height [m]; its angle is as large
-    as the acceleration allows, where that is less."""
+    """The sway of a point (4,) of the unit cube, its acceleration limited for hips at `height`."""
     s = SwaySettings
     plain = Sway(
         angle=1.0,
@@ -268,44 +249,14 @@ def _sway(point: Array, height: float) -> Sway:
     return replace(plain, angle=round(min(angle, s.acceleration / (height * fastest)), 4))
 
 
-def _point(sway: Sway) -> Array:
-    """The point (4,) of a sway, in the middle of its number of leans."""
-    s = SwaySettings
-    return np.array(
-        [
-            np.log(sway.angle / s.least) / np.log(s.most / s.least),
-            (sway.leans - 0.5) / s.leans,
-            (sway.duration - s.shortest) / (s.longest - s.shortest),
-            0.5 + 0.5 * np.log(sway.pace) / np.log(s.pace),
-        ]
-    )
-
-
 @dataclass(frozen=True)
-class MotionProposal:
-    """The standard sway, and safe `motions`, the best one first; `tried` of them were simulated."""
+class MotionProposal(Proposal):
+    """A proposal of sways: safe `motions`, the best one first."""
 
+    motions: Sequence[Tried]
     model: Model
     base: str
     rivals: Rivals
-    standard: Tried
-    motions: Sequence[Tried]
-    tried: int
-
-    @property
-    def best(self) -> Tried:
-        """The motion with the most expected evidence."""
-        return self.motions[0]
-
-    @property
-    def nats(self) -> float:
-        """Expected evidence [nats] of one run of it, between the effects hardest to separate."""
-        return self.best.evidence.least
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """These two effects."""
-        return self.best.evidence.first, self.best.evidence.nearest
 
     @property
     def repeats(self) -> int | None:
@@ -317,8 +268,8 @@ class MotionProposal:
     def sentence(self) -> str:
         """What the motion gains, in words."""
         first, second = self.pair
-        best, standard = self.best, self.standard
-        what = f"A sway of {best.sway.duration:.2g} s with {best.sway.leans} leans"
+        best, standard = self.designed, self.standard
+        what = f"A sway of {best.test.duration:.2g} s with {best.test.leans} leans"
         gives = f"{strength(self.nats)} evidence between {first} and {second}"
         if self.repeats is None:
             return (
@@ -334,24 +285,13 @@ class MotionProposal:
         return f"{text}, {ratio:.2g} times as much per second as a slow lean to both sides."
 
     def json(self) -> dict[str, Any]:
-        """The figures behind the sentence; `designed` and `standard` have the same keys."""
-        return {
-            "motion": "sway",
-            "nats": self.nats,
-            "rivals": self.pair,
-            "sentence": self.sentence,
-            "strength": strength(self.nats),
-            "log_s": self.best.log_s,
-            "repeats": self.repeats,
-            "designed": self.best.evidence.json(self.best.log_s),
-            "standard": self.standard.evidence.json(self.standard.log_s),
-            "tried": self.tried,
-        }
+        """The same with the runs that it takes."""
+        return {"motion": "sway", "repeats": self.repeats, **super().json()}
 
     def write(self, out: Path, tried: Tried) -> None:
         """One of the motions as a task YAML. Raises KembaError."""
-        notes = self.sentence if tried is self.best else "the next best motion"
-        dump_yaml(task(self.model, self.base, tried.sway, tried.done, notes), out)
+        notes = self.sentence if tried is self.designed else "the next best motion"
+        dump_yaml(task(self.model, self.base, tried.test, tried.done, notes), out)
 
     def nats_of(self, run: str | Path) -> float:
         """Expected evidence [nats] of the plan in a run folder."""
@@ -379,6 +319,7 @@ def propose_motion(
     if design is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no log of the robot shows a difference between {names}")
-    found = MotionProposal(model, base, rivals, *design)
-    found.write(out, found.best)
+    standard, motions, tried = design
+    found = MotionProposal(standard, motions[0], tried, motions, model, base, rivals)
+    found.write(out, motions[0])
     return found

@@ -7,6 +7,7 @@ and how each log begins; all by their slopes. Of 50 pairs on standard tests a fi
 steps settled the same (by hand).
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +17,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.infer.linear import is_shape, priors
 from kemba.identify.infer.refit import Frozen, refit
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.problem import Array, Problem, Theta
 
 
 class ExperimentSettings:
@@ -130,6 +130,62 @@ class Separation:
         }
 
 
+@dataclass(frozen=True)
+class JudgedTest:
+    """A test, the evidence that its log is expected to hold, and the seconds of that log."""
+
+    test: Any
+    evidence: Separation
+    log_s: float
+
+    @property
+    def pace(self) -> float:
+        """Expected evidence [nats] per second of log."""
+        return self.evidence.least / self.log_s
+
+
+@dataclass(frozen=True)
+class Proposal(ABC):
+    """The best standard test and the designed one; `tried`: how many were looked at."""
+
+    standard: JudgedTest
+    designed: JudgedTest
+    tried: int
+
+    @property
+    def chosen(self) -> JudgedTest:
+        """The test that is to be done."""
+        return self.designed
+
+    @property
+    def nats(self) -> float:
+        """Expected evidence [nats] of it between the two effects that are hardest to separate."""
+        return self.chosen.evidence.least
+
+    @property
+    def pair(self) -> tuple[str, str]:
+        """These two effects."""
+        return self.chosen.evidence.first, self.chosen.evidence.nearest
+
+    @property
+    @abstractmethod
+    def sentence(self) -> str:
+        """What the test gains, in words."""
+
+    def json(self) -> dict[str, Any]:
+        """The figures behind the sentence; `designed` and `standard` have the same keys."""
+        return {
+            "nats": self.nats,
+            "rivals": self.pair,
+            "sentence": self.sentence,
+            "strength": strength(self.nats),
+            "log_s": self.chosen.log_s,
+            "designed": self.designed.evidence.json(self.designed.log_s),
+            "standard": self.standard.evidence.json(self.standard.log_s),
+            "tried": self.tried,
+        }
+
+
 def separation(problem: Problem, rivals: Rivals) -> Separation | None:
     """The evidence between the rivals that logs of this problem's motion would hold.
 
@@ -141,7 +197,8 @@ def separation(problem: Problem, rivals: Rivals) -> Separation | None:
     first, *others = names
     figures = _columns(problem, rivals.theta(first), tuple(problem.nuisance))
     at = {name: problem.residual(rivals.theta(name)) for name in names}
-    free = {name: _columns(problem, rivals.theta(name), _own(problem, name)) for name in names}
+    own = {name: tuple(problem.candidates[name].keys()) for name in names}
+    free = {name: _columns(problem, rivals.theta(name), own[name]) for name in names}
 
     def against(fitted: str, truth: str) -> float:
         """Evidence [nats] against one rival if the other is there."""
@@ -150,14 +207,8 @@ def separation(problem: Problem, rivals: Rivals) -> Separation | None:
     return Separation(first, {o: min(against(o, first), against(first, o)) for o in others})
 
 
-def _own(problem: Problem, effect: str) -> tuple[str, ...]:
-    return tuple(problem.candidates[effect].keys())
-
-
 def _left(gap: Array, figures: Array, free: Array) -> float:
-    """Half the squared distance that is left of a gap (n,) between two predictions where columns
-    may bend: those of `figures` (n, k), per prior width, at the price of their prior, `free` ones
-    at none."""
+    """Half the squared distance left of a gap (n,) if `figures` bend at their prior's price."""
     count, rows = figures.shape[1], np.hstack([figures, free])
     priced = np.vstack([rows, np.eye(count, rows.shape[1])])
     whole = np.concatenate([gap, np.zeros(count)])
@@ -167,18 +218,8 @@ def _left(gap: Array, figures: Array, free: Array) -> float:
 
 def _columns(problem: Problem, theta: Theta, names: tuple[str, ...]) -> Array:
     """Slopes (n, k) of the residual along these parameters, per prior width."""
-    return np.asarray(problem.jacobian(theta, names) * _widths(problem, theta, names))
-
-
-def _widths(problem: Problem, theta: Theta, names: tuple[str, ...]) -> Array:
-    """Prior widths (k,) of parameters, in their units; those of shapes at their values."""
-    _, _, width = priors(problem, theta, names)
-    return np.array(
-        [
-            w * theta[name] if is_shape(problem, name) else w
-            for name, w in zip(names, width, strict=True)
-        ]
-    )
+    value = [theta[name] if is_shape(problem, name) else 1.0 for name in names]
+    return np.asarray(problem.jacobian(theta, names) * priors(problem, theta, names)[2] * value)
 
 
 def best_fit(problem: Problem, rivals: Rivals, name: str) -> dict[str, float]:
@@ -187,12 +228,6 @@ def best_fit(problem: Problem, rivals: Rivals, name: str) -> dict[str, float]:
     shared = (key.rsplit(".", 1)[0] for key in rivals.shared)
     frozen = Frozen(names, problem.jacobian(theta, names))
     return refit(problem, tuple(sorted({name, *shared})), theta, frozen).theta
-
-
-def evidence(problem: Problem, rivals: Rivals, rival: str) -> float:
-    """How much worse [nats] the best fit of a rival explains logs without noise than what made
-    them, which explains them entirely."""
-    return misfit(problem, best_fit(problem, rivals, rival))
 
 
 def misfit(problem: Problem, theta: Theta) -> float:

@@ -16,8 +16,7 @@ from kemba.identify.infer.null_model import LinearisationPoint, effect_bounds
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import START, error_ratio
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Labels, Theta
+from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
 
 class CrossValidationSettings:
@@ -60,8 +59,7 @@ def one_part_shows(search: Search, hypothesis: Hypothesis, against: Hypothesis =
 def _distances(
     search: Search, hypothesis: Hypothesis, against: Hypothesis, fine: bool = False
 ) -> Array:
-    """How far apart the predictions of two hypotheses are in each part of the logs (p,): sum of
-    squares in noise units, twice what the right one of them is expected to gain there."""
+    """Squared distance (p,) of two predictions in each part: twice the gain expected there."""
     ours, theirs = (search.points[h].linear for h in (hypothesis, against))
     other = dict(zip(theirs.names, theirs.at.tolist(), strict=True))
     step = np.array([other.get(n, z) - z for n, z in zip(ours.names, ours.at, strict=True)])
@@ -123,17 +121,11 @@ def gained(gains: Array, distances: Array) -> Gain:
 
 
 def _powers(search: Search, point: LinearisationPoint, judged: Linear, fine: bool = False) -> Array:
-    """Sum of squares (p,) that `judged` has of each part of the logs under the fit to all others.
-    The parts are runs, as a rule; `fine`: quarters of runs.
-
-    A left-out part judges the hypothesis alone: all other effects are absent, and no nominal
-    figure may leave its tolerance to imitate an effect. How a log begins is taken from all blocks:
-    only the first ones show it.
-    """
+    """Sum of squares (p,) of each part under the fit to all others, other effects absent."""
     linear, parts, found = point.linear, folds(search, fine), []
     for part in np.unique(parts):
         mask = parts == part
-        fit = within_tolerance(search, linear.without(mask), point.hypothesis)
+        fit = within_tolerance(search, linear.only(~mask), point.hypothesis)
         step = begun(linear, fit) - linear.at
         gram, slope, power = judged.only(mask).total
         found.append(power + 2 * slope @ step + step @ gram @ step)
@@ -221,8 +213,8 @@ def error(search: Search, hypothesis: Hypothesis, kept: HeldOut | None) -> float
 def error_as_it_is(search: Search, kept: HeldOut | None = None) -> float:
     """Error of the model as it is along the motion that it makes of the data itself, as `compare`
     tells it; without logs `kept` of the fitted ones."""
-    own = search.own or (search.problem, search.points[NULL].fit.theta)
-    return _ratio(search, kept.plain if kept else own[0].with_noise_of(search.problem), own[1])
+    problem, theta = search.own or (search.problem, search.points[NULL].fit.theta)
+    return _ratio(search, kept.plain if kept else problem.with_noise_of(search.problem), theta)
 
 
 def _ratio(search: Search, judge: Problem, theta: Theta) -> float:

@@ -10,8 +10,7 @@ from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import BootstrapSettings, bootstrap, redrawn_noise
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker
 from kemba.identify.problem.noise import drift_waves
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Parameter
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem
 
 
 def drift_columns(problem: Problem) -> tuple[Array, Array]:
@@ -114,8 +113,11 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if not formulas:
         return None
     ranker, jacobian, names = extended(search, formulas)
-    chosen = _matters(search, _formula(ranker, names, _grow(ranker, names)))
-    alone = _formula(ranker, names, chosen)
+    alone = _formula(ranker, names, _grow(ranker, names))
+    parts = zip(alone.candidates, alone.terms, alone.coefficients, strict=True)
+    weight = {t: search.problem.weight(null.fit.theta, t) for t in alone.terms}
+    chosen = tuple(n for n, term, (c, _) in parts if abs(c) * weight[term] > MATTERS)
+    alone = _formula(ranker, names, chosen)  # without the imperfection that every model has
     catalogue = search.points[best].log_evidence - null.log_evidence
     if not chosen or alone.gain <= catalogue + by_chance(len(names)):
         return None
@@ -124,13 +126,6 @@ def look(search: Search, best: Hypothesis) -> Formula | None:
     if alone.gain <= catalogue + test.threshold:
         return None
     return replace(alone, gain=alone.gain - catalogue, p_value=test.p_value(alone.gain))
-
-
-def _matters(search: Search, formula: Formula) -> Hypothesis:
-    """Those terms of a formula that are more than the imperfection that every model has."""
-    problem, theta = search.problem, search.points[NULL].fit.theta
-    parts = zip(formula.candidates, formula.terms, formula.coefficients, strict=True)
-    return tuple(n for n, term, (c, _) in parts if abs(c) * problem.weight(theta, term) > MATTERS)
 
 
 def _grow(ranker: Ranker, names: Mapping[str, str]) -> Hypothesis:

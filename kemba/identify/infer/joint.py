@@ -31,10 +31,9 @@ from kemba.identify.infer.refit import Frozen, refit
 from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.infer.windows import START
 from kemba.identify.problem.candidates import LINK
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.identify.problem.structure import ORIFICE
-from kemba.identify.problem.types import Array, Candidate, Labels, Theta
 from kemba.model.model import Model
 
 BLOCKS = (12, 24, 48)  # of time, at least; with fewer than 12 the scatter itself is not known
@@ -149,7 +148,7 @@ class JointFit:
         """The parameters of one effect, as the catalogue has them."""
         found = {}
         for parameter in candidate.parameters:
-            name, unit = candidate.reciprocal.get(parameter.name, (parameter.name, parameter.unit))
+            name, unit = candidate.reported(parameter)
             i = self.names.index(f"{candidate.effect}.{name}")
             value, low, high = (float(x[i]) for x in (self.value, self.low, self.high))
             found[name] = Value(value, low, high, unit)
@@ -211,19 +210,15 @@ def _fitted(
     free = (*own, *_single_figures(problem), *starts)
     theta = {k: v for k, v in start.items() if k in keys or k in free}
     loose = {n: (problem.nuisance[n][0], LOOSE) for n in own if n in RIG_FIGURES}
-    candidates = problem.candidates | {
-        name: _whole(problem.candidates[name]) for name in problem.structures & set(hypothesis)
-    }
+    candidates = dict(problem.candidates)
+    for name in problem.structures & set(hypothesis):  # whole, as the written model has it
+        lead = replace(candidates[name].lead, lower=1.0, upper=1.0)
+        candidates[name] = replace(candidates[name], lead=lead)
     for _ in range(ROUNDS):
         problem = copy(problem.coarser(theta))
         problem.nuisance, problem.candidates = problem.nuisance | loose, candidates
         theta = refit(problem, hypothesis, theta, Frozen(free, problem.jacobian(theta, free))).theta
     return problem, own, theta
-
-
-def _whole(structure: Candidate) -> Candidate:
-    """Another structure as the model that is written has it: whole, not as a share."""
-    return replace(structure, lead=replace(structure.lead, lower=1.0, upper=1.0))
 
 
 def _judged(
@@ -277,8 +272,7 @@ def _as_written(
     covariance: Array,
     remarks: list[str],
 ) -> JointFit:
-    """The estimate in the catalogue's names and units: a figure that is scaled by its value, a
-    reciprocal as what it is the reciprocal of, all within their bounds."""
+    """The estimate in the catalogue's names and units, within bounds."""
     value, low, high = (x.copy() for x in triple)
     told, slope, figures = [], np.ones(len(names)), dict[str, Any]()
     ends = np.stack([low, high], axis=1)

@@ -8,8 +8,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Flags, Labels, Parameter, Theta
+from kemba.identify.problem.problem import (
+    Array,
+    Candidate,
+    Flags,
+    Labels,
+    Parameter,
+    Problem,
+    Theta,
+)
 
 
 class LinearSettings:
@@ -44,23 +51,27 @@ class Linear:
         """J'J (k, k), J'r0 (k,) and r0'r0 over all blocks."""
         return self.gram.sum(axis=0), self.slope.sum(axis=0), float(self.power.sum())
 
-    def without(self, blocks: Flags) -> Linear:
-        """The same with the blocks where `blocks` (b,) is true left out."""
-        return self.only(~blocks)
-
     def only(self, keep: Flags) -> Linear:
         """The same with the blocks where `keep` (b,) is true."""
-        return replace(
-            self,
-            gram=self.gram[keep],
-            slope=self.slope[keep],
-            power=self.power[keep],
-            count=self.count[keep],
-        )
+        sums = {name: getattr(self, name)[keep] for name in ("gram", "slope", "power", "count")}
+        return replace(self, **sums)
 
     def index(self, name: str) -> int:
         """Place of a name. Raises ValueError where it is none of `names`."""
         return self.names.index(name)
+
+    def best(self) -> Array:
+        """z (k,) of the best fit, every parameter free within its prior."""
+        gram, slope, _ = self.total
+        h = gram * np.outer(self.width, self.width) + np.eye(len(self.width))
+        eta = (self.mean - self.at) / self.width - self.width * slope
+        return np.asarray(self.at + self.width * np.linalg.solve(h, eta))
+
+    def cost(self, z: Array) -> float:
+        """Half the sum of squares at z (k,), and of how far it is from the priors."""
+        (gram, slope, power), step = self.total, z - self.at
+        pull = (z - self.mean) / self.width
+        return 0.5 * float(power + 2.0 * slope @ step + step @ gram @ step + pull @ pull)
 
 
 def precision_factor(gram: Array, width: Array) -> Array:
@@ -79,14 +90,8 @@ def precision_factor(gram: Array, width: Array) -> Array:
 
 def names_of(problem: Problem, theta: Theta) -> tuple[str, ...]:
     """Nuisance, every switch, and the shapes of the effects that are on."""
-    shapes = [
-        key
-        for c in problem.candidates.values()
-        if is_on(theta, c.key, c.lead)
-        for key in tuple(c.keys())
-        if key != c.key
-    ]
-    return (*problem.nuisance, *(c.key for c in problem.candidates.values()), *shapes)
+    switches = (c.key for c in problem.candidates.values())
+    return (*problem.nuisance, *switches, *usual_shapes(problem.candidates, theta))
 
 
 def is_on(theta: Theta, key: str, lead: Parameter) -> bool:
@@ -99,19 +104,11 @@ def linearise(
 ) -> tuple[Linear, Array, Array]:
     """The problem at theta, with J (n, k) and the residual (n,); `blocks` (n,) labels the rows."""
     names = names_of(problem, theta) if names is None else tuple(names)
-    r, jacobian = problem.residual(theta), _slopes_at(problem, theta, names)
-    at, mean, width = priors(problem, theta, names)
-    return condense(names, at, mean, width, jacobian, r, blocks), jacobian, r
-
-
-def _slopes_at(problem: Problem, theta: Theta, names: Iterable[str]) -> Array:
-    """J (n, k) at theta, along the logarithm of every shape."""
-    names = tuple(names)
-    jacobian = problem.jacobian(theta, names)
+    r, jacobian = problem.residual(theta), problem.jacobian(theta, names)
     for i, name in enumerate(names):
-        if is_shape(problem, name):
+        if is_shape(problem, name):  # along its logarithm
             jacobian[:, i] *= theta[name]
-    return jacobian
+    return condense(names, *priors(problem, theta, names), jacobian, r, blocks), jacobian, r
 
 
 def condense(
@@ -125,17 +122,10 @@ def condense(
 ) -> Linear:
     """Sums over each block: `jacobian` (n, k), `r` (n,), `blocks` (n,) labels of the rows; `at`,
     `mean` and `width` (k,) as in `Linear`."""
-    labels = np.unique(blocks)
-    gram, slope, power, count = [], [], [], []
-    for label in labels:
-        rows = blocks == label
-        j, e = jacobian[rows], r[rows]
-        gram.append(j.T @ j)
-        slope.append(j.T @ e)
-        power.append(float(e @ e))
-        count.append(int(rows.sum()))
-    arrays = (np.array(a) for a in (gram, slope, power, count))
-    return Linear(tuple(names), at, mean, width, *arrays)
+    masks = (blocks == label for label in np.unique(blocks))
+    parts = ((jacobian[own], r[own]) for own in masks)  # one copy at a time
+    sums = [(j.T @ j, j.T @ e, float(e @ e), len(e)) for j, e in parts]
+    return Linear(tuple(names), at, mean, width, *map(np.array, zip(*sums, strict=True)))
 
 
 def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) -> Linear:
@@ -148,7 +138,13 @@ def moved(linear: Linear, at: Array, jacobian: Array, r: Array, blocks: Labels) 
 def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float]:
     """Theta with every effect's parameters inside their bounds."""
     bounds = {k: p for c in candidates.values() for k, p in c.keys().items()}
-    clipped = {k: _sane(v, bounds[k]) if k in bounds else v for k, v in theta.items()}
+    clipped = dict(theta)
+    for key in clipped.keys() & bounds.keys():
+        p, value = bounds[key], clipped[key]
+        if np.isnan(p.typical):  # a switch, which stays within a few sizes of off
+            reach = LinearSettings.farthest * p.size
+            value = np.clip(value, p.off - reach, p.off + reach)
+        clipped[key] = float(np.clip(value, p.lower, p.upper))
     return usual_shapes(candidates, clipped) | clipped
 
 
@@ -161,14 +157,6 @@ def usual_shapes(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str,
         for key, p in c.keys().items()
         if key != c.key
     }
-
-
-def _sane(value: float, parameter: Parameter) -> float:
-    """Within the bounds, and within a few sizes of off where it is a switch."""
-    if np.isnan(parameter.typical):
-        reach = LinearSettings.farthest * parameter.size
-        value = float(np.clip(value, parameter.off - reach, parameter.off + reach))
-    return float(np.clip(value, parameter.lower, parameter.upper))
 
 
 def is_shape(problem: Problem, name: str) -> bool:
@@ -224,14 +212,6 @@ def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
         if name in problem.nuisance:
             nominal, sigma = problem.nuisance[name]
             theta[name] = float(np.clip(value, nominal - widths * sigma, nominal + widths * sigma))
-    return _clean(problem, theta)
-
-
-def _clean(problem: Problem, theta: Mapping[str, float]) -> dict[str, float]:
-    off = {
-        key
-        for c in problem.candidates.values()
-        if not is_on(theta, c.key, c.lead)
-        for key in tuple(c.keys())
-    }
+    absent = (c for c in problem.candidates.values() if not is_on(theta, c.key, c.lead))
+    off = {key for c in absent for key in tuple(c.keys())}
     return {k: v for k, v in theta.items() if k not in off}

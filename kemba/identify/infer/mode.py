@@ -14,8 +14,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.identify.infer.linear import Linear, estimate, moved, priors, usual_shapes
 from kemba.identify.infer.spike_slab import Hypothesis, Ranker
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Labels, Theta
+from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
 
 class SmallEffectsSettings:
@@ -78,20 +77,12 @@ def _at(
     r: Array,
     slopes: tuple[Linear, Array, Labels],
 ) -> Mode:
-    """The problem about theta, where the residual is r (n,). What linear evidence promises beyond
-    it may not be there: points are compared by their `cost`."""
+    """The problem about theta, where the residual is r (n,)."""
     linear, jacobian, blocks = slopes
-    about = moved(linear, priors(problem, theta, linear.names)[0], jacobian, r, blocks)
-    return Mode(dict(theta), about, r, _cost_at(problem, hypothesis, theta, r, linear))
-
-
-def _cost_at(
-    problem: Problem, hypothesis: Hypothesis, theta: Theta, r: Array, linear: Linear
-) -> float:
-    """Half a sum of squares of the residual r (n,) at theta and of the hypothesis's priors."""
     z, mean, _ = priors(problem, theta, linear.names)
     pull = (z - mean) / _ranker(problem, linear).widths(hypothesis, 1.0)
-    return 0.5 * float(r @ r + pull @ pull)
+    cost = 0.5 * float(r @ r + pull @ pull)
+    return Mode(dict(theta), moved(linear, z, jacobian, r, blocks), r, cost)
 
 
 def _ranker(problem: Problem, linear: Linear, absent: Collection[str] = ()) -> Ranker:
@@ -99,24 +90,17 @@ def _ranker(problem: Problem, linear: Linear, absent: Collection[str] = ()) -> R
 
 
 def _possible(problem: Problem, hypothesis: Hypothesis, linear: Linear) -> dict[str, float]:
-    """Theta of the best fit with every switch on its possible side.
-
-    What would be on the impossible one is absent, and all others are fitted without it. Effects
-    that are not named have their usual shapes; another structure stays as it is.
-    """
+    """Theta of the best fit in which what would be on an impossible side is absent."""
     absent: set[str] = set()
     free = {n: c for n, c in problem.candidates.items() if n not in hypothesis}
     while True:
         z = _ranker(problem, linear, absent).score(hypothesis).z
         theta = estimate(problem, linear, z)
-        wrong = {n for n, c in free.items() if _impossible(c, theta) or n in problem.structures}
+        wrong = free.keys() & problem.structures
+        wrong |= {n for n, c in free.items()
+                  if not c.lead.signed and theta.get(c.key, c.lead.off) <= c.lead.off}  # fmt: skip
         if wrong <= absent:
             break
         absent |= wrong
     found = {k: v for k, v in theta.items() if k not in {free[n].key for n in absent}}
     return usual_shapes(free, found) | found
-
-
-def _impossible(candidate: Candidate, theta: Theta) -> bool:
-    lead = candidate.lead
-    return not lead.signed and theta.get(candidate.key, lead.off) <= lead.off

@@ -1,19 +1,20 @@
 """The problem linearised at refitted hypotheses, the model as it is first: its fit, the colour of
 the noise, and the linear evidence of every effect."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.colour import best_fit, learnt_colour, with_learnt_colour
 from kemba.identify.infer.linear import (
     Linear,
     LinearSettings,
     condense,
     estimate,
+    is_on,
     is_shape,
+    linearise,
     names_of,
     priors,
     time_blocks,
@@ -22,8 +23,59 @@ from kemba.identify.infer.mode import Mode, mode_of
 from kemba.identify.infer.refit import Fit, Frozen, refit
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker, Score
 from kemba.identify.infer.windows import Windows, windows_of
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Labels
+from kemba.identify.problem.problem import Array, Labels, Problem, Theta
+from kemba.identify.problem.sensor_faults import moves_readings
+
+
+class DriftSettings:
+    """When the sensors are taken to drift."""
+
+    strong = 3.0  # evidence from which sensors drift [nats]: Kass and Raftery 1995, twenty to one
+
+
+def with_learnt_colour(
+    problem: Problem, theta: Theta, blocks: Labels | None = None, careful: bool = False
+) -> Problem:
+    """The problem under the noise colour of a flexible model's residual (n,) about `theta`.
+
+    A residual of the model under test would not do: a missing effect would pass for coloured
+    noise. `careful`: the model at theta is good; see `Problem.recolour`.
+    """
+    if not problem.learns_colour:
+        return problem
+    found = learnt_colour(problem, theta, blocks, careful)[0]
+    blamed = any(moves_readings(n) for n in theta if n not in problem.nuisance)
+    return _with_drift(found, theta) if careful and (blamed or not problem.moves) else found
+
+
+def _with_drift(problem: Problem, theta: Theta) -> Problem:
+    """The problem with drifting sensors, where the logs are clearly likelier so."""
+    drifting = problem.drifting()
+    if drifting is None:
+        return problem
+    gain = log_likelihood(drifting, theta) - log_likelihood(problem, theta)
+    return drifting if gain > DriftSettings.strong else problem
+
+
+def log_likelihood(problem: Problem, theta: Theta) -> float:
+    """Log likelihood [nats] of the logs, up to a constant, all effects free within their priors."""
+    linear, _, _ = linearise(problem, theta, time_blocks(problem))
+    h = linear.total[0] * np.outer(linear.width, linear.width) + np.eye(len(linear.width))
+    spread = 0.5 * float(np.linalg.slogdet(h)[1])
+    return problem.log_density() - linear.cost(linear.best()) - spread
+
+
+def learnt_colour(
+    problem: Problem, theta: Theta, blocks: Labels | None, careful: bool
+) -> tuple[Problem, Array]:
+    """The same, and the Jacobian (n, k) at theta of the problem without colour."""
+    plain = problem.recolour(None)
+    blocks = time_blocks(plain) if blocks is None else blocks
+    linear, jacobian, _ = linearise(plain, theta, blocks)
+    on = tuple(n for n, c in plain.candidates.items() if is_on(theta, c.key, c.lead))
+    mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
+    left = mode.residual + jacobian @ (mode.linear.best() - mode.linear.at)
+    return plain.recolour(left, careful=careful), jacobian
 
 
 @dataclass(frozen=True)
@@ -152,7 +204,8 @@ class Baseline:
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
-        self._learn_noise(theta, keep=False)
+        blocks = self.division.blocks
+        self.problem = with_learnt_colour(self.problem, theta, blocks, careful=True)
         self._rank(self.point.fit.theta)
 
     def _start(self) -> None:
@@ -171,8 +224,13 @@ class Baseline:
         for _ in range(ROUNDS):
             r = problem.residual(theta)
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
-            theta = estimate(problem, linear, best_fit(linear))
-        self._rank(theta, known if moving else self._learn_noise(theta, keep=True))
+            theta = estimate(problem, linear, linear.best())
+        # where the motion moves, the search learns the colour with it
+        if not moving and problem.learns_colour:
+            self.problem, plain = learnt_colour(problem, theta, blocks, careful=False)
+            self._rank(theta, self.problem.whiten(plain))
+        else:
+            self._rank(theta, known if moving else None)
 
     def _rank(self, theta: Mapping[str, float], jacobian: Array | None = None) -> None:
         """Linearise at theta, and score every hypothesis there."""
@@ -190,7 +248,7 @@ class Baseline:
         names = names or self.point.linear.names
         linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        mode = self._mode(NULL, [theta], linear, self.jacobian)
+        mode = mode_of(self.problem, NULL, [theta], linear, self.jacobian, self.division.blocks)
         score = self.ranker(mode.linear).score(NULL)
         self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
 
@@ -200,39 +258,11 @@ class Baseline:
         """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
         r = self.problem.residual(fit.theta)
         linear, windowed = self.division.linear(fit.theta, names, slopes, r)
-        starts = [fit.theta] if self.problem.moves else [fit.theta, self._beside(fit.theta)]
-        mode = self._mode(hypothesis, starts, linear, slopes)
+        starts = [fit.theta]
+        if not self.problem.moves:  # and with what the mode of nothing has a little of beside it
+            on, found = {key.rsplit(".", 1)[0] for key in fit.theta}, self.point.mode.theta.items()
+            starts.append({k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | fit.theta)
+        blocks = self.division.blocks
+        mode = mode_of(self.problem, hypothesis, starts, linear, slopes, blocks)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)
-
-    def _beside(self, theta: Mapping[str, float]) -> dict[str, float]:
-        """Theta with what the mode of nothing has a little of beside its effects."""
-        on = {key.rsplit(".", 1)[0] for key in theta}
-        found = self.point.mode.theta.items()
-        return {k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | dict(theta)
-
-    def _mode(
-        self,
-        hypothesis: Hypothesis,
-        starts: Iterable[Mapping[str, float]],
-        linear: Linear,
-        slopes: Array,
-    ) -> Mode:
-        """The mode of a hypothesis from the best of these starts."""
-        return mode_of(self.problem, hypothesis, starts, linear, slopes, self.division.blocks)
-
-    def _learn_noise(self, theta: Mapping[str, float], keep: bool) -> Array | None:
-        """Learn the noise colour from the residual that is left when every effect may help to
-        explain.
-
-        A residual of the null would not do: a missing effect would pass for coloured noise. Returns
-        the Jacobian at theta under the new colour when it is wanted (`keep`).
-        """
-        if not self.problem.learns_colour or self.problem.moves:
-            return None  # where the motion moves, the search learns the colour with it
-        blocks = self.division.blocks
-        if not keep:
-            self.problem = with_learnt_colour(self.problem, theta, blocks, careful=True)
-            return None
-        self.problem, jacobian = learnt_colour(self.problem, theta, blocks, careful=False)
-        return self.problem.whiten(jacobian)

@@ -1,6 +1,5 @@
 """The effects in order of probability, with their parameters and their equivalents."""
 
-from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -13,7 +12,6 @@ from kemba.identify.infer.null_model import within_bounds
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, strength
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, SpikeSlabSettings, share_of
-from kemba.identify.problem.types import Array, Candidate, Parameter
 
 # two explanations are equivalent when their evidence differs by less [nats]: Kass and Raftery
 # 1995, 'strong' evidence begins at 3 nats
@@ -34,9 +32,11 @@ def ranked(
     """The effects in order of probability; those of the selected hypothesis first, then the
     others of the `whole` that is written, with what the `joint` fit says of them."""
     problem, best = search.problem, selection.best
-    probability = (
-        search.probabilities(selection.dismissed) if best else _doubted(search.probabilities())
-    )
+    probability = search.probabilities(selection.dismissed if best else ())
+    if not best:  # where nothing was found significant, nothing is the likeliest
+        rest = sum(p for h, p in probability.items() if h)
+        scale = min(1.0, DOUBTED / rest) if rest > 0 else 1.0
+        probability = {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
     shares = share_of(probability, problem.candidates)
     order = sorted(
         shares,
@@ -50,19 +50,13 @@ def ranked(
         hypothesis = hypothesis or _likeliest_with(search, effect)
         if not hypothesis:
             continue
-        found.append(
-            Ranked(
-                effect,
-                shares[effect],
-                joint.values(problem.candidates[effect])
-                if joint is not None and written
-                else values(search, hypothesis, effect),
-                equivalents(search, selection, effect) if effect in best else (),
-                before,
-                error(search, hypothesis, kept),
-                left_out(search, hypothesis).nats,
-            )
-        )
+        if joint is not None and written:
+            told = joint.values(problem.candidates[effect])
+        else:
+            told = values(search, hypothesis, effect)
+        alike = equivalents(search, selection, effect) if effect in best else ()
+        after, gain = error(search, hypothesis, kept), left_out(search, hypothesis).nats
+        found.append(Ranked(effect, shares[effect], told, alike, before, after, gain))
     return found
 
 
@@ -72,13 +66,6 @@ def _likeliest_with(search: Search, effect: str) -> Hypothesis:
         return (effect,)
     having = [h for h in search.points if effect in h]
     return max(having, key=lambda h: search.points[h].log_evidence, default=NULL)
-
-
-def _doubted(probability: Mapping[Hypothesis, float]) -> dict[Hypothesis, float]:
-    """Where nothing was found significant, nothing is the likeliest."""
-    rest = sum(p for h, p in probability.items() if h)
-    scale = min(1.0, DOUBTED / rest) if rest > 0 else 1.0
-    return {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
 
 
 def equivalents(search: Search, selection: Selection, effect: str) -> tuple[str, ...]:
@@ -106,33 +93,19 @@ def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Val
     point, found = search.points[hypothesis], {}
     z, covariance = within_bounds(problem, point), point.score.covariance
     for key, parameter in candidate.keys().items():
-        i = point.linear.index(key)
-        ends = _interval(z[i], covariance[i, i], None if is_shape(problem, key) else parameter)
-        triple = np.array([z[i], *ends])
-        if is_shape(problem, key):
+        i, shape = point.linear.index(key), is_shape(problem, key)  # shapes by their logarithm
+        step = 1.0 if shape else abs(z[i] - parameter.off)
+        reach = 1.96 * float(np.hypot(np.sqrt(covariance[i, i]), SpikeSlabSettings.spike * step))
+        triple = z[i] + reach * np.array([0.0, -1.0, 1.0])
+        if shape:
             triple = np.exp(np.clip(triple, -50, 50))
         triple = np.clip(triple, parameter.lower, parameter.upper)
-        name, unit, triple = reported(candidate, parameter.name, parameter.unit, triple)
-        value, low, high = (float(t) for t in triple)
+        name, unit = candidate.reported(parameter)
+        if name != parameter.name:
+            triple = 1.0 / np.maximum(triple, 1e-12)[[0, 2, 1]]
+        value, low, high = triple.tolist()
         found[name] = Value(value, low, high, unit)
     return found
-
-
-def _interval(centre: float, variance: float, switch: Parameter | None) -> tuple[float, float]:
-    """95 % interval of an effect's `switch`, or of the logarithm of its shape (None)."""
-    step = 1.0 if switch is None else abs(centre - switch.off)
-    reach = 1.96 * float(np.hypot(np.sqrt(variance), SpikeSlabSettings.spike * step))
-    return centre - reach, centre + reach
-
-
-def reported(candidate: Candidate, name: str, unit: str, triple: Array) -> tuple[str, str, Array]:
-    """Name, unit and `triple` (3,) = value, low, high of a parameter as the catalogue has it, also
-    where the search was for its reciprocal value."""
-    if name not in candidate.reciprocal:
-        return name, unit, triple
-    name, unit = candidate.reciprocal[name]
-    value, low, high = 1.0 / np.maximum(triple, 1e-12)
-    return name, unit, np.array([value, high, low])
 
 
 def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:

@@ -6,13 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.identify.infer.colour import with_learnt_colour
 from kemba.identify.infer.linear import estimate, names_of
-from kemba.identify.infer.null_model import Baseline, LinearisationPoint
+from kemba.identify.infer.null_model import Baseline, LinearisationPoint, with_learnt_colour
 from kemba.identify.infer.refit import Fit, Frozen, refit
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior, probabilities
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Problem, Theta
 from kemba.stopwatch import Stage
 
 
@@ -98,7 +96,10 @@ class Search:
         if self.problem.moves:
             return self._follow(best)
         if best != NULL:
-            promising = self._promising()
+            null = self.points[NULL].log_evidence
+            gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
+            least = SearchSettings.promising * max(gains.values())
+            promising = [h for h, gain in gains.items() if gain > least]
             self.base.seen_from(self.points[best].fit.theta)
             self.problem = self.base.problem
             self.points = {NULL: self.base.point}
@@ -108,43 +109,37 @@ class Search:
         return self._swap(self._grow(best)) if best else best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
-        """Repeat the search along the motion that the best hypothesis makes of the data, until the
-        best hypothesis stays the same."""
+        """Repeat the search along the motion that the best hypothesis makes, until it stays."""
         for _ in range(SearchSettings.followed):
             if best == NULL or self.ended:
                 return best
-            before, best = best, self._along(best)
+            before = best
+            self._along(best)
+            best = self._round(NULL, SearchSettings.leaders)
             if best == before:
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
 
-    def _along(self, guess: Hypothesis) -> Hypothesis:
-        """The best single effect along the motion that a guess makes of the data."""
+    def _along(self, guess: Hypothesis) -> None:
+        """Begin again along the motion that a guess makes of the data."""
         self.say(f"searching again with {' + '.join(guess)} in the model")
         self.start(self._settle(guess))
         self.visit(guess)
-        return self._round(NULL, SearchSettings.leaders)
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
-        """Find the motion again with an answer of several effects, and let it grow from there.
-
-        Each effect that joins changes the motion, and with it what the others seem to be.
-        """
+        """Find the motion again with several effects, each of which changes it, and grow."""
         for _ in range(SearchSettings.regrown):
             if len(best) < 2 or self.ended:
                 break
             before = best
-            self.say(f"searching again with {' + '.join(best)} in the model")
-            self.start(self._settle(best))
-            self.visit(best)
+            self._along(best)
             best = self._grow(best)
             if best == before:
                 break
         return best
 
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
-        """Find the motion that a hypothesis makes of the data, until late sensors stay as late; the
-        best theta there."""
+        """Find the motion of a hypothesis until late sensors stay as late; the best theta."""
         settings, theta = SearchSettings, self.points[hypothesis].fit.theta
         asked = self.problem
         for _ in range(settings.settled):
@@ -172,17 +167,11 @@ class Search:
         self.points = {NULL: self.base.point}
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
-        """Refit `given` with one more effect, the likeliest ones whose linear evidence is `least`
-        or more; the best of all points so far."""
-        self._refit_leaders(given, leaders, least)
-        if given == NULL and self.points[NULL].fitted_error > SearchSettings.structural:
-            for structure in sorted(self.problem.structures):
-                self.visit((structure,))
-        return self.best()
-
-    def _refit_leaders(self, given: Hypothesis, leaders: int, least: float) -> None:
+        """Refit `given` with one more effect, of the likeliest ones; the best of all points."""
         settings = SearchSettings
-        table = self._extensions(given)
+        table = self.base.table
+        if given:  # linear evidence of it and one more effect
+            table = self.base.ranker(self.points[given].mode.linear).table(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
         reach = max(settings.far, settings.far_share * gain)
@@ -197,12 +186,10 @@ class Search:
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
-
-    def _extensions(self, given: Hypothesis) -> dict[Hypothesis, float]:
-        """Linear evidence of `given` plus one effect."""
-        if given == NULL:
-            return self.base.table
-        return self.base.ranker(self.points[given].mode.linear).table(given)
+        if given == NULL and self.points[NULL].fitted_error > settings.structural:
+            for structure in sorted(self.problem.structures):
+                self.visit((structure,))
+        return self.best()
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
@@ -232,13 +219,6 @@ class Search:
             best = self._grow(best)
         return best
 
-    def _promising(self) -> list[Hypothesis]:
-        """Refitted hypotheses that gained a good share of what the best one gained."""
-        null = self.points[NULL].log_evidence
-        gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-        least = SearchSettings.promising * max(gains.values())
-        return [h for h, gain in gains.items() if gain > least]
-
     def visit(self, hypothesis: Hypothesis, number: int = 1, of: int = 1) -> LinearisationPoint:
         """Refit a hypothesis, once, and score it there; `number` `of` so many, for who waits."""
         if hypothesis not in self.points:
@@ -251,12 +231,7 @@ class Search:
         return self.points[hypothesis]
 
     def _take_secant(self, hypothesis: Hypothesis, fit: Fit) -> None:
-        """From here on a refitted effect counts by its secant, no longer by its slope at nothing.
-
-        Under every hypothesis each absent effect may be there with a small share of its size. Far
-        from nothing its slope promises more than the effect can do: a wrong hypothesis would look
-        good because of a sensor that is late by several rows, which it does not name.
-        """
+        """A refitted effect counts by its secant: far from nothing its slope promises too much."""
         problem, (effect, *others) = self.problem, hypothesis
         candidate = problem.candidates[effect]
         if others or not problem.moves or problem.is_straight(candidate.key):
@@ -270,8 +245,7 @@ class Search:
             self._secants = True
 
     def _point(self, hypothesis: Hypothesis, fit: Fit) -> LinearisationPoint:
-        """The problem about a refitted point: slopes of its own parameters are those of the fit,
-        all others are the null's."""
+        """The problem about a refit: own slopes are those of the fit, all others the null's."""
         names, base = names_of(self.problem, fit.theta), self.base
         known = {n: i for i, n in enumerate(base.point.linear.names)}
         own = {i: fit.columns[n] for i, n in enumerate(names) if n in fit.columns}
@@ -282,8 +256,7 @@ class Search:
         return base.judged(hypothesis, fit, names, slopes)
 
     def _guess(self, hypothesis: Hypothesis) -> dict[str, float]:
-        """Where a refit starts: at its last result, or at the linear estimate from the largest part
-        of the hypothesis that was refitted."""
+        """Where a refit starts: its last result, or the linear estimate from its largest part."""
         if hypothesis in self._thetas:
             return self._thetas[hypothesis]
         parts = [h for h in self.points if set(h) < set(hypothesis)]

@@ -71,7 +71,7 @@ def simplest(search: Search, selection: Selection) -> Selection:
     """
     best = selection.best
     _thin(search, best)
-    known = _known_parts(search, best)
+    known = [h for h in search.points if h and set(h) <= set(best)]  # it and its parts
     least = min(known, key=lambda h: window_powers(search, h).sum())
     equal = [h for h in known if _is_enough(search, h, least)]
     fine = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
@@ -81,15 +81,13 @@ def simplest(search: Search, selection: Selection) -> Selection:
     if chosen == best:
         return selection
     # the evidence proposed this one as a part of the best only: alone it need not be the likeliest
-    count, parts = len(search.problem.candidates), _known_parts(search, chosen)
+    count, parts = len(search.problem.candidates), [h for h in known if set(h) <= set(chosen)]
     chosen = max(parts, key=lambda h: search.points[h].log_evidence + log_prior(h, count))
     return _instead(search, selection, chosen)
 
 
 def _thin(search: Search, best: Hypothesis) -> None:
-    """Refit the answer with ever fewer effects: each time without the one that is missed least, for
-    as long as the error stays within one standard error of the smallest, and until the answer is
-    due."""
+    """Refit with ever fewer effects while the error stays within one standard error."""
     rest = least = best
     while len(rest) > 1 and not search.late:
         smaller = _parts_of(rest)
@@ -98,11 +96,6 @@ def _thin(search: Search, best: Hypothesis) -> None:
         least = min(least, rest, key=lambda h: window_powers(search, h).sum())
         if not _is_enough(search, rest, least):
             break
-
-
-def _known_parts(search: Search, hypothesis: Hypothesis) -> list[Hypothesis]:
-    """The hypothesis and all refitted ones with some of its effects."""
-    return [h for h in search.points if h and set(h) <= set(hypothesis)]
 
 
 def _parts_of(hypothesis: Hypothesis) -> list[Hypothesis]:
@@ -137,10 +130,7 @@ def overclaimed(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool
 
 
 def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Selection:
-    """A smaller hypothesis selected. Others with as many effects that predict as well, within
-    one standard error, are its rivals, whatever their evidence is, which did not count for the
-    larger one either; those that predict worse are dismissed, and so are larger ones that predict
-    no better, or that add an effect which was left out."""
+    """A smaller hypothesis selected, as good ones its rivals, worse or larger ones dismissed."""
     rivals, dismissed = [], {selection.best, *selection.dismissed}
     dropped = set(selection.best).union(*selection.dismissed) - set(chosen)
     for other in search.points:
@@ -152,14 +142,15 @@ def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Select
             set(chosen) < set(other) and dropped & set(other)
         ):
             dismissed.add(other)
-    remark = _remark(search, selection.best, chosen)
-    return replace(
-        selection,
-        best=chosen,
-        dismissed=frozenset(dismissed),
-        rivals=tuple(sorted(rivals)),
-        remarks=(*selection.remarks, remark),
+    gone = [e for e in selection.best if e not in chosen]
+    nats = search.points[selection.best].log_evidence - search.points[chosen].log_evidence
+    remark = (
+        f"{' and '.join(gone)} would fit these readings better (by {nats:.0f} nats), but "
+        "predict left-out data little or no better, and are left out; logs of other motions would "
+        "tell"
     )
+    remarks, smaller = (*selection.remarks, remark), frozenset(dismissed)
+    return Selection(chosen, selection.p_value, smaller, tuple(sorted(rivals)), remarks)
 
 
 def is_unsupported(search: Search, best: Hypothesis) -> bool:
@@ -202,16 +193,6 @@ def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
     rows = search.points[larger].windowed.count.sum()
     left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
     return window_gain(search, larger, smaller).nats < SHARE * left
-
-
-def _remark(search: Search, best: Hypothesis, chosen: Hypothesis) -> str:
-    dropped = [e for e in best if e not in chosen]
-    nats = search.points[best].log_evidence - search.points[chosen].log_evidence
-    return (
-        f"{' and '.join(dropped)} would fit these readings better (by {nats:.0f} nats), but "
-        "predict left-out data little or no better, and are left out; logs of other motions would "
-        "tell"
-    )
 
 
 def selected(search: Search, best: Hypothesis, p_value: float) -> Selection:

@@ -10,7 +10,7 @@ from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.infer.linear import Linear, precision_factor
 from kemba.identify.infer.windows import START
-from kemba.identify.problem.types import Array, Candidate, Labels
+from kemba.identify.problem.problem import Array, Candidate, Labels
 
 
 class SpikeSlabSettings:
@@ -104,8 +104,7 @@ class Ranker:
         return np.asarray(np.maximum(width, 1e-12))
 
     def _sign_term(self, hypothesis: Hypothesis, z: Array, covariance: Array) -> float:
-        """What the sign of switches that cannot be negative adds to the log evidence: the prior has
-        one side only, and so has the posterior."""
+        """What the sign of switches that cannot be negative adds to the log evidence."""
         total = 0.0
         for effect in hypothesis:
             lead, i = self.candidates[effect].lead, self.lead[effect]
@@ -123,8 +122,7 @@ class Ranker:
         return dict(zip(keys, total.tolist(), strict=True))
 
     def _beside(self, given: Hypothesis, others: list[str], tolerance: float) -> Array:
-        """Log evidence (o,) of `given` with each of the `others`, from one factor: only the prior
-        width of one parameter differs then (Sherman and Morrison)."""
+        """Log evidence (o,) of `given` with each of the `others` (Sherman and Morrison)."""
         linear = self.linear
         width, wide = (self.widths(h, tolerance) for h in (given, tuple(self.candidates)))
         shift = linear.mean - linear.at
@@ -151,9 +149,7 @@ class Ranker:
     def _sides(
         self, effects: list[str], covariance: Array, step: Array, i: Labels, by: Array, share: Array
     ) -> Array:
-        """As `_sign_term` (o,) for one effect each, where the parameter `i` (o,) has another width:
-        a step goes further `by` (o,) times its covariance with it, a variance falls by `share`
-        (o,) times its square."""
+        """As `_sign_term` (o,), where the prior width of parameter `i` (o,) is another one."""
         leads = [self.candidates[e].lead for e in effects]
         j = np.array([self.lead[e] for e in effects], dtype=int)
         along = covariance[j, i]

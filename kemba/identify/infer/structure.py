@@ -14,14 +14,13 @@ import numpy as np
 from scipy.special import expit
 
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, VerdictSettings, phrase
-from kemba.identify.infer.colour import best_fit
 from kemba.identify.infer.cross_validation import left_out
 from kemba.identify.infer.joint import JointFit
 from kemba.identify.infer.linear import linearise, names_of, time_blocks
 from kemba.identify.infer.refit import Frozen, refit
-from kemba.identify.infer.residual import rest_of
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, share_of
+from kemba.identify.infer.verdict import rest_of
 from kemba.identify.infer.windows import error_ratio, excess
 from kemba.identify.problem.problem import Problem
 
@@ -71,14 +70,11 @@ def ahead(problem: Problem, theta: Mapping[str, float], error: float) -> Rebuilt
 
 
 def _unexplained(problem: Problem, theta: Mapping[str, float]) -> float:
-    """Nats per row that are left when every effect within this structure may help, by a linear
-    step from theta."""
+    """Nats per row left when every effect within this structure may help, by a linear step."""
     other = {problem.candidates[name].key for name in problem.structures}
     names = [name for name in names_of(problem, theta) if name not in other]
-    linear, jacobian, r = linearise(problem, theta, time_blocks(problem), names)
-    z = best_fit(linear)
-    left, far = r + jacobian @ (z - linear.at), (z - linear.mean) / linear.width
-    return 0.5 * float(left @ left + far @ far) / len(r)
+    linear, _, r = linearise(problem, theta, time_blocks(problem), names)
+    return linear.cost(linear.best()) / len(r)
 
 
 def structure_row(
@@ -103,14 +99,8 @@ def structure_row(
         values[name] = Value(value, low, high, p.unit)
     share = share_of(first.probabilities(), [structure])[structure]
     share = max(share, float(expit(nats)) if nats > 0.0 else 0.0)
-    gain = left_out(first, _likeliest_with(first, structure)).nats
+    gain = left_out(first, (structure,)).nats
     return Ranked(structure, share, values, (), *errors, gain)
-
-
-def _likeliest_with(search: Search, effect: str) -> Hypothesis:
-    """The likeliest hypothesis that has this effect."""
-    having = [h for h in search.points if effect in h]
-    return max(having, key=lambda h: search.points[h].log_evidence)
 
 
 def joined(row: Ranked, p_value: float, answer: Answer, second: Search, best: Hypothesis) -> Answer:

@@ -1,22 +1,32 @@
-"""What may be said of a finished search: why its answer is not complete, and the verdict."""
+"""What may be said of a finished search: why its answer is not complete (error that repeats itself,
+patterns of force), the verdict, and what to measure next."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
+
+import numpy as np
 
 from kemba.effects.rigs.axis import DriveAxis
 from kemba.errors import enumerated
 from kemba.identify.answer import ENDED, Ranked, Verdict, VerdictSettings
+from kemba.identify.compare.bins import BinSettings
+from kemba.identify.compare.compare import conditions
+from kemba.identify.compare.force_profiles import ForceProfileSettings, force_profiles
+from kemba.identify.compare.hints import lacking
+from kemba.identify.compare.words import place_of
 from kemba.identify.infer.cross_validation import HeldOut, error
 from kemba.identify.infer.formula import Formula
 from kemba.identify.infer.joint import RIG_FIGURES, JointFit, given_figure
 from kemba.identify.infer.ranking import values
-from kemba.identify.infer.residual import Drift, explains_structure, pattern_left, unfinished
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection
 from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import excess
 from kemba.identify.logs.gate import unit_in_doubt
+from kemba.identify.problem.problem import Array, Labels
 from kemba.identify.problem.sensor_faults import is_fault
 from kemba.model.model import Model
+from kemba.units import short
 
 # gains that no sensor and no motor has, least and largest: a sensor's is off by ten times its usual
 # error there, a motor's force is known to 10 %
@@ -39,7 +49,6 @@ class Caveats:
 def caveats_of(
     search: Search,
     selection: Selection,
-    drift: Drift | None,
     kept: HeldOut | None,
     ended: bool = False,
 ) -> Caveats:
@@ -48,17 +57,14 @@ def caveats_of(
     settings, reasons, best = VerdictSettings, [], selection.best
     before, after = (error(search, h, kept) for h in (NULL, best))
     least = settings.part
-    if drift is not None:
-        reasons.append(str(drift))
-        least = settings.part_of_structure
-    elif unfinished(search, best):
+    if unfinished(search, best):
         reasons.append("the error that is left repeats itself with motion and valves")
         least = settings.part_of_structure
     elif pattern := pattern_left(search, best):
         reasons.append(f"the error that is left has a pattern: {pattern}")
         if not explains_structure(search, best):
             least = settings.part_of_structure
-    if drift is None and after <= settings.whole:
+    if after <= settings.whole:
         least = settings.part  # a whole answer may leave as much
     if ended and after > settings.whole:
         reasons.append(ENDED)
@@ -73,7 +79,9 @@ def caveats_of(
         others = ", ".join(" + ".join(h) for h in selection.rivals)
         reasons.append(f"{others} would predict left-out data as well as {' + '.join(best)}")
     part = bool(best) and excess(after) <= (1.0 - least) * excess(before)
-    unsure = _unasked(search, best) if ended else ()
+    unsure = best if ended else ()  # smaller answers, and sensors that drift instead, come last
+    if len(best) == 1 or not search.late:
+        unsure = tuple(e for e in unsure if is_fault(e))
     if unsure and not reasons:
         return Caveats((ENDED,), part=True, unsure=unsure)
     return Caveats(tuple(reasons), part, unsure)
@@ -126,13 +134,6 @@ def _of_rig(name: str, times: float, right: bool) -> list[str]:
     return [] if right else [said]
 
 
-def _unasked(search: Search, best: Hypothesis) -> Hypothesis:
-    """Effects of an ended search's answer that nothing else was asked for: smaller answers, and
-    sensors that drift instead of being wrong, come last."""
-    asked_smaller = len(best) == 1 or not search.late
-    return tuple(e for e in best if is_fault(e)) if asked_smaller else best
-
-
 def verdict_on(best: Hypothesis, formula: Formula | None, caveats: Caveats) -> Verdict:
     """Missing, where the answer is complete; partly, where it explains enough of the error."""
     if formula is not None or (caveats.reasons and not caveats.part):
@@ -145,3 +146,113 @@ def verdict_on(best: Hypothesis, formula: Formula | None, caveats: Caveats) -> V
 def is_sure(ranked: Ranked) -> bool:
     """Whether an effect is likely enough to be added to a model, and nothing could stand for it."""
     return ranked.probability >= VerdictSettings.sure and not ranked.equivalent_to
+
+
+# When error that repeats itself tells that something is missing.
+STRUCTURE = 1.0  # repeatable mean square, in noise units, that an imperfect model may leave
+LEFT = 0.1  # the same as a share of what the answer explains
+CLIP = 30.0  # residuals are clipped at so many sigmas
+RIDGES = (1e-4, 1e-2, 1.0)  # penalties of the regression that are tried
+FOLDS = 5  # blocks of time that are left out in turn: five
+
+
+def _structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
+    """Mean square of the residual in noise units, and the part that other folds predict."""
+    left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
+    if left_over is None:
+        return 1.0, 0.0
+    r = np.clip(left_over.residual, -CLIP, CLIP)
+    columns = left_over.features
+    columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
+    folds = np.zeros(len(r), dtype=int)  # blocks of time of each run, dealt out in turn
+    for run in np.unique(left_over.run):
+        own = np.flatnonzero(left_over.run == run)
+        folds[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
+    power = float(np.mean(r**2))
+    left = min(float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in RIDGES)
+    return power, max(power - left, 0.0)
+
+
+def _predicted_folds(r: Array, columns: Array, folds: Labels, ridge: float) -> Array:
+    """Residual (n,) that a ridge regression on the other folds predicts for each."""
+    predicted = np.zeros(len(r))
+    for fold in np.unique(folds):
+        out = folds == fold
+        a, b = columns[~out], r[~out]
+        h = a.T @ a + ridge * len(a) * np.eye(a.shape[1])
+        predicted[out] = columns[out] @ np.linalg.solve(h, a.T @ b)
+    return predicted
+
+
+def unfinished(search: Search, best: Hypothesis) -> bool:
+    """Whether so much structure is left that the answer cannot be complete."""
+    power, structure = _structured(search, best)
+    if not best or structure <= STRUCTURE:
+        return structure > STRUCTURE
+    before, _ = _structured(search, NULL)
+    return structure > LEFT * max(before - power, 0.0)
+
+
+def explains_structure(search: Search, best: Hypothesis) -> bool:
+    """Whether an answer leaves hardly any of the error that repeats itself without it: of a lost
+    force of 20 N 0.4 %, of a wrong supply that stands for something else all of it."""
+    before, after = (_structured(search, h)[1] for h in (NULL, best))
+    return after < LEFT * before
+
+
+BENCH = "run this cylinder alone on a rig: slow strokes, fast strokes, and the rod locked"
+NEXT = {  # by the end of a channel's name
+    "piston": BENCH,
+    "rod": BENCH,
+    "hip": "swing this hip in the air with closed valves, slowly and fast",
+    "pitch": "tilt the body by hand in the air, and let it drop with the legs at rest",
+}
+BODY = "let the robot drop with the legs at rest, and move the boom by hand"
+ON_RIGS = {  # by the kind of rig of the model; a piston of the robot on its bench has none
+    "drive": "move the axis slowly and fast, to and fro, with and without load",
+    "vessel": "fill and empty the vessel from several pressures",
+}
+STROKES = "move the rod slowly and fast over its whole stroke, hold it between, at other pressures"
+
+
+def pattern_left(search: Search, best: Hypothesis) -> str:
+    """A force that the best hypothesis leaves and that goes with speed, place, load or a command,
+    in words; empty where none explains a fair share of what the hypothesis itself explains.
+
+    A force is no pattern where it is negligible. What it explains is held against the scatter that
+    is left, and not against the noise alone: noise of another colour than was learnt goes with many
+    things a little.
+    """
+    point = search.points[best]
+    if not best or point.fitted_error < BinSettings.tolerated:
+        return ""
+    settings, problem = ForceProfileSettings, search.problem
+    found = force_profiles(problem, problem.residual(point.fit.theta))
+    plain = [force for force in found if force.largest > settings.negligible * force.usual]
+    first = max(plain, key=lambda force: force.gain, default=None)
+    gained = point.log_evidence - search.points[NULL].log_evidence
+    least = max(settings.plain, LEFT * gained)
+    if first is None or first.gain < least * point.fitted_error**2:
+        return ""
+    return str(first)
+
+
+def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> tuple[str, str]:
+    """Where the error sits that the best hypothesis leaves, and which measurement would tell more
+    of it. `unsure`: effects in it that have rivals."""
+    problem, theta = search.problem, search.points[best].fit.theta
+    profiles = force_profiles(problem, problem.residual(theta))
+    law = [hint.text for hint in lacking(profiles)]
+    bins = sorted(conditions(problem, theta), key=lambda b: -b.ratio)
+    worst = [f"{place_of(b)} ({short(b.ratio)} times the noise)" for b in bins if b.significant][:1]
+    channel = profiles[0].channel if law else bins[0].channel if worst else ""
+    rest = "; ".join([*worst, *law]) or "no condition in particular"
+    if unsure:
+        named = " and ".join(unsure)
+        told = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"
+        return rest, told
+    if not problem.moves:
+        model = getattr(problem, "model", None)
+        return rest, STROKES if model is None else ON_RIGS.get(model.mechanism.rig, STROKES)
+    parts = channel.replace(" ", "/").split("/")
+    return rest, next((text for key, text in NEXT.items() if key in parts), BODY)

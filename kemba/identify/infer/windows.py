@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Labels, Rows, Texts, Theta
+from kemba.identify.problem.problem import Array, Labels, Problem, Rows, Texts, Theta
 
 START = "start:"  # names of nuisance parameters that say how a log begins
 

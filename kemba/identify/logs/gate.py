@@ -34,9 +34,7 @@ def _log_fault(
     return KembaError(f"{where}: {column}" if column else where, what, expected, hint)
 
 
-FEWEST = 60  # rows that the log of a moving rig needs
 FEWEST_STILL = 8  # readings per channel that a vessel's log needs
-MISSING = 0.3  # share of readings of a needed column that may be missing
 VACUUM = 2e4  # no rig's pressure is below this [Pa]: gauge or bar read so as pascals
 END = 0.1  # share of the stroke within which a moving rod may be one in another unit
 SHARE = 0.2  # travel, as a share of the farthest place, from which a rod moves
@@ -60,7 +58,7 @@ def _faults(log: Trajectory) -> list[KembaError]:
     """Faults of one log; a later check runs only where the earlier ones found nothing."""
     stages = (_columns, _time, _cells, _values)
     if log.meta["kind"] in OWN_RIGS:
-        stages = (_rig_columns, _rig_time, _rig_readings, _rig_excitation)
+        stages = (_columns, _time, _rig_readings, _rig_excitation)
     for stage in stages:
         found = list(stage(log))
         if found:
@@ -69,23 +67,26 @@ def _faults(log: Trajectory) -> list[KembaError]:
 
 
 def _columns(log: Trajectory) -> Iterator[KembaError]:
+    """Columns that are needed, all known ones in their units; of a vessel, pressure or temperature
+    will do."""
+    kind, logged = log.meta["kind"], log.meta.get("logged", {})
+    rig = kind in OWN_RIGS
+    enough = kind == "vessel" and any(name in log for name in logged)
     for name in needed(log):
-        if name not in log:
+        if name not in log and not enough:
             hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
-            yield _log_fault(log, f"needs the column '{name}', which is missing", hint=hint)
+            header = f"{name} [{logged[name]}]" if rig else name
+            why = "the model's rig asks for it" if rig else ""
+            yield _log_fault(log, f"needs the column '{header}', which is missing", why, hint)
     for name in log.names:
-        unit = _unit_of(name)
+        unit = "1" if "valve/" in name else None
+        if range_of(name):
+            unit = CHANNELS[name.split("/")[-1]][0]
+        unit = logged.get(name) if rig else unit
         if unit is not None and log.unit(name) != unit:
             what = f"the column's unit is [{log.unit(name)}]"
-            expected, hint = f"'{name} [{unit}]' was expected", "convert it with --map"
-            yield _log_fault(log, what, expected, hint, column=name)
-
-
-def _unit_of(name: str) -> str | None:
-    """The unit that a column must have; None where the gate does not know the column."""
-    if "valve/" in name:
-        return "1"
-    return CHANNELS[name.split("/")[-1]][0] if range_of(name) else None
+            hint = "convert it with --map" + "; is the axis of the rig linear or rotary?" * rig
+            yield _log_fault(log, what, f"'{name} [{unit}]' was expected", hint, column=name)
 
 
 def _clock(log: Trajectory, fewest: int) -> Iterator[KembaError]:
@@ -108,10 +109,13 @@ def _clock(log: Trajectory, fewest: int) -> Iterator[KembaError]:
 
 
 def _time(log: Trajectory) -> Iterator[KembaError]:
-    t, limits = log.time, GateSettings
-    faults = list(_clock(log, limits.fewest))
-    if faults:
+    t, limits, kind = log.time, GateSettings, log.meta["kind"]
+    faults = list(_clock(log, FEWEST_STILL if kind == "vessel" else limits.fewest))
+    if faults or kind in OWN_RIGS:
         yield from faults
+        places = [n for n in needed(log) if n.endswith(("/x", "/q"))]
+        if not faults and kind != "vessel" and not all(_follows(log[n]) for n in places):
+            yield from _seldom(log, limits.milliseconds)
         return
     span = t[-1] - t[0]
     if span < limits.shortest:
@@ -293,33 +297,6 @@ def sentence(faults: Iterable[KembaError]) -> str:
     return "The data cannot be right: " + " | ".join(str(f) for f in faults[:3]) + more
 
 
-def _rig_columns(log: Trajectory) -> Iterator[KembaError]:
-    """Columns that the rig's model asks for; of a vessel, pressure or temperature will do."""
-    logged: dict[str, str] = log.meta.get("logged", {})
-    known = [name for name in logged if name in log]
-    enough = log.meta["kind"] == "vessel" and bool(known)
-    for name, unit in logged.items():
-        if name not in log:
-            if enough:
-                continue
-            hint = "; ".join(filter(None, (suggest(name, log.names), UNMAPPED)))
-            what = f"needs the column '{name} [{unit}]', which is missing"
-            yield _log_fault(log, what, "the model's rig asks for it", hint)
-        elif log.unit(name) != unit:
-            what = f"the column's unit is [{log.unit(name)}]"
-            hint = "convert it with --map; is the axis of the rig linear or rotary?"
-            yield _log_fault(log, what, f"'{name} [{unit}]' was expected", hint, column=name)
-
-
-def _rig_time(log: Trajectory) -> Iterator[KembaError]:
-    vessel = log.meta["kind"] == "vessel"
-    faults = list(_clock(log, FEWEST_STILL if vessel else FEWEST))
-    if faults or vessel:
-        yield from faults
-    elif not all(_follows(log[n]) for n in needed(log) if n.endswith(("/x", "/q"))):
-        yield from _seldom(log, GateSettings.milliseconds)
-
-
 def _follows(y: Array) -> bool:
     """Whether a channel changes by little of its travel from one row to the next."""
     return bool(np.nanmedian(np.abs(np.diff(y))) < FOLLOWED * _travel(y))
@@ -335,7 +312,7 @@ def _rig_readings(log: Trajectory) -> Iterator[KembaError]:
         if vessel and good.sum() < FEWEST_STILL:
             what = f"has {int(good.sum())} readings"
             yield _log_fault(log, what, f"at least {FEWEST_STILL} were expected", column=name)
-        elif not vessel and 1.0 - good.mean() > MISSING:
+        elif not vessel and 1.0 - good.mean() > GateSettings.missing:
             what = f"{100 * (1.0 - good.mean()):.0f} % of its readings are missing"
             yield _log_fault(log, what, column=name, row=int(np.argmin(good)))
         elif name.endswith("/P") and np.median(y[good]) < VACUUM:

@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.ndimage import correlate1d
 
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 
 
 def local_fit(values: Array, width: int, step: float, degree: int, derivative: int = 0) -> Array:

@@ -95,13 +95,7 @@ def _check_kind(kind: Any, kinds: Collection[str], where: str) -> str:
 def _check_noise(
     noise: Any, units: Mapping[str, str], where: str
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Noise (1 sigma, in the column's SI unit) by channel without unit, and the correlation time
-    [s] of those channels that have one; `units` by channel.
-
-    A channel is written as in the log, with or without its unit. The value is a number in that
-    unit, a text such as '0.3 mm', or a group such as `{sigma: 0.3 mm, time: 10 ms}`. Raises
-    KembaError where it is no positive finite number.
-    """
+    """Noise [SI] by channel, correlation time [s] where given. Raises KembaError."""
     if noise is None:
         return {}, {}
     if not isinstance(noise, Mapping):
@@ -172,8 +166,7 @@ def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
 
 
 def _with_torques(log: Trajectory) -> Trajectory:
-    """A robot's log without any torque, as the authors' own is, with torques of zero: the fit then
-    takes them as unknown (`log.meta["torques"]` is False), and says what that costs."""
+    """A robot's log without any torque, with torques of zero that count as unknown."""
     legs = [name.removesuffix("/hip/q") for name in log.names if name.endswith("/hip/q")]
     if log.meta["kind"] != "robot" or not legs or any(f"{leg}/hip/tau" in log for leg in legs):
         return log
@@ -188,8 +181,7 @@ def _with_torques(log: Trajectory) -> Trajectory:
 
 
 def _turned(log: Trajectory) -> Trajectory:
-    """The log with angles that begin anew after each turn joined, and said so; those that a map
-    leaves as they are (`log.meta["kept"]`) stay so."""
+    """The log with angles that begin anew after each turn joined, but for `log.meta["kept"]`."""
     kept = log.meta.pop("kept", ())
     angles = [
         n for n in log.names if log.unit(n) == "rad" and not n.endswith("/v") and n not in kept
@@ -205,22 +197,16 @@ def _turned(log: Trajectory) -> Trajectory:
 
 
 def _without_absurd(log: Trajectory) -> Trajectory:
-    """The log with readings that no channel can have as missing ones: their squares overflow.
-
-    So are the few that this channel cannot have, where the gate tolerates so few of them.
-    """
-    wild = {name: _wild(name, values) for name, values in log.items()}
-    broken = {name: np.where(wild[name], np.nan, log[name]) for name in wild if wild[name].any()}
-    return log.with_columns({f"{n} [{log.unit(n)}]": y for n, y in broken.items()})
-
-
-def _wild(name: str, y: Array) -> np.ndarray:
-    limits, known = GateSettings, range_of(name)
-    beyond = np.abs(y) > limits.absurd
-    if known is None:
-        return np.asarray(beyond)
-    outside = (y < known[0]) | (y > known[1])
-    return np.asarray(beyond | (outside & (outside.sum() <= limits.impossible * len(y))))
+    """The log without readings that no channel, or a few that this one cannot have."""
+    limits, broken = GateSettings, {}
+    for name, y in log.items():
+        wild = np.abs(y) > limits.absurd
+        if known := range_of(name):
+            outside = (y < known[0]) | (y > known[1])
+            wild |= outside & (outside.sum() <= limits.impossible * len(y))
+        if wild.any():
+            broken[f"{name} [{log.unit(name)}]"] = np.where(wild, np.nan, y)
+    return log.with_columns(broken)
 
 
 def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
@@ -236,17 +222,12 @@ def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> 
     if len(kinds) > 1:
         named = ", ".join(f"{log.meta['name']}: {log.meta['kind']}" for log in logs)
         raise KembaError("", "logs of several kinds cannot be fitted together", named)
-    _tell_apart(logs)
-    return logs
-
-
-def _tell_apart(logs: Sequence[Trajectory]) -> None:
-    """Logs of one name get their folder's name before it."""
     names = [log.meta["name"] for log in logs]
     for log in logs:
-        if names.count(log.meta["name"]) > 1:
+        if names.count(log.meta["name"]) > 1:  # logs of one name get their folder's before it
             path = Path(log.meta["path"]).resolve()
             log.meta["name"] = f"{path.parent.name}/{path.stem}"
+    return logs
 
 
 def legs_of(log: Trajectory) -> tuple[str, ...]:

@@ -6,9 +6,16 @@ from typing import Generic, TypeVar
 from kemba.effects import BY_KIND
 from kemba.effects.base import Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
+from kemba.identify.problem.problem import Candidate, Parameter, Theta
 from kemba.identify.problem.sensor_faults import possible_faults
-from kemba.identify.problem.structure import LINE, ORIFICE, LineResistance, OrificeShare
-from kemba.identify.problem.types import Candidate, Parameter, Theta
+from kemba.identify.problem.structure import (
+    LINE,
+    ORIFICE,
+    LineResistance,
+    OrificeShare,
+    line_candidates,
+    structure_candidates,
+)
 from kemba.model.evaluation import port_name
 from kemba.model.model import Model
 from kemba.quantity import Param
@@ -132,25 +139,75 @@ def where_field(kind: str) -> str:
     return next((name for name, field in fields.items() if field.is_required()), "on")
 
 
-def leg_candidates(model: Model, kinds: Iterable[str]) -> dict[str, Candidate]:
-    """Each of these kinds of effects on one leg only, as `seal_friction:front`, beside one value
-    for all legs.
+GROUND = ("ground_compliance", "ground_friction", "contact")
+SHARED = ("supply_scale",)  # one supply feeds all legs
+SOFTNESS = "ground_compliance.softness"
+GRIP = "ground_friction.mu"
+LAGS = ("hose_lag.T", "motor_lag.T")
+NONE = 1e-6  # a lag that is none [s]: far below a row
+ROBOT_CANDIDATE_SOFTNESS = 5e-5  # size of a ground's softness [m.N-1]
+SOFTEST = 1e-3  # largest softness of a ground [m.N-1]
 
-    Effects with a state of their own are left out: a leg cannot have the same state twice.
+
+def robot_candidates(model: Model) -> dict[str, Candidate]:
+    """The effects that `model` lacks, also on one leg only, and its lengths.
+
+    One leg only, as `seal_friction:front`, beside one value for all legs: not of effects with a
+    state of their own, which a leg cannot have twice. A soft ground is searched by its softness
+    1/k.
     """
-    legs = model.mechanism.legs
-    own = [k for k in kinds if BY_KIND[k].place == "leg" and not by_default(k).states()]
-    names = {f"{kind}:{leg}": BY_KIND[kind] for kind in own for leg in legs if len(legs) > 1}
-    return {name: _candidate(name, effect, effect.declared()) for name, effect in names.items()}
+    found, legs, present = (
+        effect_candidates(model),
+        model.mechanism.legs,
+        {e.name for e in model.effects},
+    )
+    for kind in [n for n in found if n not in (*GROUND, *SHARED)] if len(legs) > 1 else ():
+        effect = BY_KIND[kind]
+        if effect.place == "leg" and not by_default(kind).states():
+            names = (f"{kind}:{leg}" for leg in legs)
+            found |= {name: _candidate(name, effect, effect.declared()) for name in names}
+    for part in SIZES if model.mechanism.robot else ():
+        length = Geometry(part=part)
+        if length.name not in present:
+            found[length.name] = _candidate(length.name, Geometry, length.parameters())
+    found |= structure_candidates(model) | line_candidates(model)
+    if "ground_compliance" in found:
+        found["ground_compliance"] = Candidate(
+            "ground_compliance",
+            Parameter("softness", "m.N-1", 0.0, ROBOT_CANDIDATE_SOFTNESS, 0.0, SOFTEST),
+            (Parameter("d", "s.m-1", 1.0, 0.7, 0.1, 10.0, 1.0),),
+            reciprocal={"softness": ("k", "N.m-1")},
+        )
+    return found
 
 
-def geometry_candidates(model: Model) -> dict[str, Candidate]:
-    """Every length of the robot that the model's list does not correct."""
-    present = {e.name for e in model.effects}
-    parts = [Geometry(part=part) for part in SIZES] if model.mechanism.robot else []
-    return {
-        e.name: _candidate(e.name, Geometry, e.parameters()) for e in parts if e.name not in present
-    }
+def in_the_air(found: dict[str, Candidate]) -> tuple[Candidate, ...]:
+    """The candidates that stand in the model's equations; ground and sensors do not."""
+    return tuple(c for c in found.values() if not c.sensor and c.effect not in GROUND)
+
+
+def extended(model: Model, candidates: tuple[Candidate, ...]) -> Model:
+    """The model without its ground, and with every candidate on its list, switched off."""
+    kept = [e for e in model.effects if e.kind not in GROUND]
+    bare = Model(model.mechanism, kept, model.supply, model.name)
+    return bare.with_effects(by_default(c.effect) for c in candidates)
+
+
+def ground_of(model: Model) -> tuple[float, dict[str, float]]:
+    """Friction coefficient of the model's ground, and its softness where it is not rigid."""
+    mu, soft = 1.0, {}
+    for effect in model.effects:
+        if effect.kind in GROUND:
+            mu *= float(effect.mu)  # type: ignore[attr-defined]
+        if effect.kind == "ground_compliance":
+            soft = {SOFTNESS: 1.0 / effect.k, "ground_compliance.d": effect.d}  # type: ignore[attr-defined]
+    return mu, soft
+
+
+def without_delay(name: str, value: float) -> float:
+    """A lag too short to matter as the model should have it: none."""
+    short = name in LAGS and value < CandidateSettings.fastest
+    return NONE if short else value
 
 
 def sensor_candidates(sigmas: Mapping[str, float], model: Model) -> dict[str, Candidate]:
@@ -171,10 +228,9 @@ def _candidate(
     settings = CandidateSettings
     (lead, off), *_ = effect.off.items()
     param = declared[lead]
-    # a time constant far below the sampling interval is the same as none
-    lower = (
-        max(param.lower, settings.fastest) if param.unit == "s" and param.lower > 0 else param.lower
-    )
+    lower = param.lower
+    if param.unit == "s" and lower > 0:  # far below the sampling interval it is the same as none
+        lower = max(lower, settings.fastest)
     switch = Parameter(lead, param.unit, off, param.size, lower, param.upper)
     shapes = []
     for other in (n for n in declared if n != lead):

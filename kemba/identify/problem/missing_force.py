@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
 from kemba.events import runs
-from kemba.identify.problem.types import Array, MissingForce
+from kemba.identify.problem.problem import Array, MissingForce
 
 MEMORY = 0.025  # correlation time of the missing force [s]
 ROUNDS = 20  # rounds in which its strength is learnt
@@ -47,10 +47,7 @@ def missing_along(
 
 
 def _precision(keep: Array, strength: float) -> Array:
-    """Inverse covariance of the lag as bands (2, n): the upper one, then the diagonal.
-
-    `keep` (n - 1,): share of the lag that is left after each step.
-    """
+    """Inverse covariance of the lag as bands (2, n): the upper one, then the diagonal."""
     driven = strength**2 * np.maximum(1.0 - keep**2, 1e-12)
     bands = np.zeros((2, len(keep) + 1))
     bands[1, 0] = 1.0 / strength**2

@@ -18,9 +18,8 @@ from scipy.linalg import solve_toeplitz
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 from typing_extensions import Self
 
-from kemba.identify.problem.problem import Problem
+from kemba.identify.problem.problem import Array, Flags, Labels, Problem, Rows
 from kemba.identify.problem.sensor_noise import ColourSettings
-from kemba.identify.problem.types import Array, Flags, Labels, Rows
 
 # How the step of a sensor is found.
 # readings closer than this share of their range are one reading: conversion of units rounds in
@@ -97,15 +96,11 @@ def drift_waves(time: Array) -> tuple[Array, Array]:
     a drift of them."""
     length = max(float(np.ptp(time)), 1e-9)
     order = np.arange(float(DriftColumnSettings.waves))
-    return np.cos(np.pi * np.outer((time - time[0]) / length, order)), _sigmas(order, length)
-
-
-def _sigmas(order: Array, length: float) -> Array:
-    """Standard deviations (d,) of cosines that make a lag of unit variance, over `length` [s]."""
-    memory = max(ColourSettings.drifts)
+    memory = max(ColourSettings.drifts)  # of a lag of unit variance, which the cosines make
     variance = np.where(order == 0, 0.5, 1.0) / (1.0 + (np.pi * order * memory / length) ** 2)
     mean = variance @ np.where(order == 0, 1.0, 0.5)
-    return np.asarray(DriftColumnSettings.size * np.sqrt(variance / mean))
+    sigmas = DriftColumnSettings.size * np.sqrt(variance / mean)
+    return np.cos(np.pi * np.outer((time - time[0]) / length, order)), np.asarray(sigmas)
 
 
 @dataclass(frozen=True)
@@ -169,16 +164,10 @@ def difference_sigma(values: Array) -> float:
         return 0.0
     rough = np.sort(np.abs(np.diff(known, n=3)))[: int(settings.kept * (len(known) - 3))]
     noise = float(np.sqrt(np.mean(rough**2) / 20.0))  # 20 = 1 + 9 + 9 + 1
-    noise /= _spread_of_smallest(settings.kept)
+    normal, share = NormalDist(), settings.kept
+    end = normal.inv_cdf(0.5 * (1.0 + share))  # the smallest values of a normal have less spread
+    noise /= float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / share))
     return max(noise, step_of(known) / float(np.sqrt(12.0)))
-
-
-def _spread_of_smallest(share: float) -> float:
-    """Root mean square of the `share` of a normal's values that are smallest in size, by its own
-    sigma."""
-    normal = NormalDist()
-    end = normal.inv_cdf(0.5 * (1.0 + share))
-    return float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / share))
 
 
 @dataclass(frozen=True)
@@ -217,10 +206,14 @@ def colours(
     found = {}
     for i, k in np.unique(np.stack([rows.run, rows.channel]), axis=1).T.tolist():
         own = (rows.run == i) & (rows.channel == k)
-        if drifts:
-            found[i, k] = _beside_drift(residual[own], rows.time[own], careful)
-        else:
-            found[i, k] = learn(residual[own], careful=careful)
+        left = residual[own]
+        if not drifts:
+            found[i, k] = learn(left, careful=careful)
+            continue
+        waves, sigmas = drift_waves(rows.time[own])
+        slow = waves @ np.linalg.lstsq(waves, left, rcond=None)[0]
+        plain = learn(left - slow, careful=careful)
+        found[i, k] = replace(plain, drift=DriftNoise.of(whiten(waves * sigmas, plain)))
     return found
 
 
@@ -233,14 +226,6 @@ def learn(residual: Array, order: int | None = None, careful: bool = False) -> C
     weight = caution(residual) if careful else None
     found = _yule_walker(residual if weight is None else residual * weight, order)
     return replace(found, rows=len(residual), weight=weight)
-
-
-def _beside_drift(residual: Array, time: Array, careful: bool) -> Colour:
-    """The same beside a slow drift, as large as the stated noise; rows at `time` (n,) [s]."""
-    waves, sigmas = drift_waves(time)
-    slow = waves @ np.linalg.lstsq(waves, residual, rcond=None)[0]
-    found = learn(residual - slow, careful=careful)
-    return replace(found, drift=DriftNoise.of(whiten(waves * sigmas, found)))
 
 
 def _yule_walker(residual: Array, order: int) -> Colour:

@@ -6,7 +6,7 @@ from kemba.effects import BY_KIND
 from kemba.effects.base import REMEASURED, Effect
 from kemba.effects.sensors import SensorEffect, as_measured, as_true
 from kemba.effects.series import Series
-from kemba.identify.problem.types import Theta
+from kemba.identify.problem.problem import Theta
 
 GEOMETRY = "geometry:"  # names of the lengths begin so
 
@@ -23,8 +23,7 @@ def possible_faults(channel: str) -> dict[str, SensorEffect]:
 
 
 def _carriers() -> dict[str, type[Effect]]:
-    """Every other kind of effect that makes sensors show something wrong, such as a boom whose
-    encoders count with another lever."""
+    """Other kinds of effects that make sensors wrong, such as a boom's lever."""
     own = (Effect.readings, SensorEffect.readings)
     return {k: e for k, e in BY_KIND.items() if e.readings not in own}
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def chosen_noise(
     scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
     drift = min(settings.drifts)
 
-    def fit(allowed: Array) -> tuple[Array, float]:
+    def fit(allowed: Flags) -> tuple[Array, float]:
         x, left = nnls(np.where(allowed, a / scale, 0.0), b)
         return np.where(allowed, x / scale, 0.0), float(left) ** 2
 
@@ -77,10 +77,14 @@ def chosen_noise(
     x, chi2 = fit(allowed)
     channel = np.array([k.channel for k in kinds])
     memory = np.array([k.memory for k in kinds])
-    groups = [(0.0, drift), (drift, np.inf)]  # colour, drift
+
+    def lags_of(i: int) -> list[Flags]:
+        """Which kinds are colour of a channel, and which are its drift."""
+        own = (channel == i) & (memory > 0)
+        return [own & (memory < drift), own & (memory >= drift)]
+
     for i in range(len(most)):
-        for low, high in groups:
-            own = (channel == i) & (memory > 0) & (memory >= low) & (memory < high)
+        for own in lags_of(i):
             if not (x[own] > 0).any():
                 allowed &= ~own
                 continue
@@ -91,8 +95,7 @@ def chosen_noise(
     for i in range(len(most)):
         white = float(x[(channel == i) & (memory == 0.0)].sum())
         lags = []
-        for low, high in groups:
-            own = (channel == i) & (memory > 0) & (memory >= low) & (memory < high)
+        for own in lags_of(i):
             if x[own].sum() > 0.0:
                 mean = float(np.exp(np.average(np.log(memory[own]), weights=x[own])))
                 lags.append((float(np.sqrt(x[own].sum())), mean))
@@ -101,12 +104,7 @@ def chosen_noise(
 
 
 def _sound(white: float, lags: Sequence[tuple[float, float]], most: float) -> ChannelNoise:
-    """A channel's noise within what is believed; without lags it is as stated.
-
-    `lags`: the fastest first. Each is compared with the noise that changes as fast or faster: a
-    drift may be large, and colour beside it is what differs from row to row. Where the whole is
-    more than `most`, the slowest lag gives way, if it is not the only one.
-    """
+    """A channel's noise, lags the fastest first, within what is believed (`most`)."""
     settings = ColourSettings
     whole = ChannelNoise(white, tuple(lags)).spread
     if len(lags) > 1 and whole > most:

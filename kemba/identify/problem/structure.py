@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from kemba.effects.base import At, Contribution
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.effects.pneumatics.supply import SupplyLine
-from kemba.identify.problem.types import Candidate, Parameter
+from kemba.identify.problem.problem import Candidate, Parameter
 from kemba.model.model import Model
 from kemba.quantity import Param, Quantity, Tolerance
 
@@ -36,6 +36,9 @@ VOLUME = 0.3  # of a dead volume
 STRUCTURE_LEVEL = 0.1
 REACH = 4.0  # largest error of a figure, in these sigmas
 EXPONENT = 0.08  # of the polytropic exponent
+# 1 sigma of each figure's logarithm
+WIDTHS = {"a_fill": AREA, "a_vent": AREA, "V_e": VOLUME, "V_r": VOLUME,
+          LEVEL: STRUCTURE_LEVEL, "n": EXPONENT}  # fmt: skip
 
 
 class OrificeShare(OrificeChamber):
@@ -93,20 +96,13 @@ def structure_candidates(model: Model) -> dict[str, Candidate]:
     share = OrificeShare().of_cylinder(model.mechanism.need_cylinder())
     declared = share.declared()
     shapes = []
-    for name, width in _widths().items():
+    for name, width in WIDTHS.items():
         param, usual = declared[name], float(share.value(name))
         reach = math.exp(REACH * width)
         low, high = max(param.lower, usual / reach), min(param.upper, usual * reach)
         shapes.append(Parameter(name, param.unit, usual, width, low, high, usual))
     lead = Parameter("a", "1", 0.0, 1.0, 0.0, 1.0)
     return {ORIFICE: Candidate(ORIFICE, lead, tuple(shapes))}
-
-
-def _widths() -> dict[str, float]:
-    """1 sigma of each figure's logarithm."""
-    areas = dict.fromkeys(("a_fill", "a_vent"), AREA)
-    volumes = dict.fromkeys(("V_e", "V_r"), VOLUME)
-    return {**areas, **volumes, "level": STRUCTURE_LEVEL, "n": EXPONENT}
 
 
 def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
@@ -120,9 +116,8 @@ def with_orifices(model: Model, values: Mapping[str, float]) -> Model:
 def free_figures(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """The figures of orifice chambers of all legs as nuisance parameters of a model that has them:
     value and 1 sigma by name; `gauge` is the scale of its table."""
-    widths = _widths()
     usual = {LEVEL: 1.0, **values}
-    return {n: (usual[k], widths[k] * usual[k]) for n, k in FIGURES.items() if k in usual}
+    return {n: (usual[k], WIDTHS[k] * usual[k]) for n, k in FIGURES.items() if k in usual}
 
 
 def orifice_item(values: Mapping[str, float]) -> dict[str, Any]:

@@ -19,8 +19,7 @@ from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divi
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import check_logs
 from kemba.identify.logs.reading import excerpts, read_logs, taken_on
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.rigs.problem import rig_problem
 from kemba.identify.rigs.vessel import vessel_problem
 from kemba.logs import load_map, log_files
@@ -82,19 +81,16 @@ class RigFit:
 
 
 def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
-    """Fit every figure that the model lists, and those of the rig itself. Effects that are listed
-    without a value start at their usual size; a shape that these logs cannot tell stays as it is.
-    Raises KembaError where logs cannot tell figures apart.
-    """
-    started = Model(model.mechanism, map(_started, model.effects), model.supply, model.name)
-    names = [
-        name
-        for name, (_, value) in started.parameters.items()
-        if value
-        and (
-            name in RIG_FIGURES or name.split(".")[0] not in {t.split(".")[0] for t in RIG_FIGURES}
-        )
-    ]
+    """Fit all figures that the model lists and that show. Raises KembaError."""
+    effects = []
+    for effect in model.effects:  # a switch that stands at off starts at its usual size
+        sizes = effect.parameters()
+        off = {n: v + sizes[n].size for n, v in effect.off.items() if effect.value(n) == v}
+        effects.append(effect.bind(off) if off and effect.moves else effect)
+    started = Model(model.mechanism, effects, model.supply, model.name)
+    brought = {name.split(".")[0] for name in RIG_FIGURES}  # of these only the figures named
+    listed = [name for name, (_, value) in started.parameters.items() if value]
+    names = [n for n in listed if n in RIG_FIGURES or n.split(".")[0] not in brought]
     make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]
@@ -111,13 +107,6 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     return _fit(problem, names, values, model, rms(before.residual({})))
 
 
-def _started(effect: Effect) -> Effect:
-    """The effect with its switch at the usual size where it stands at off."""
-    sizes = effect.parameters()
-    off = {n: v + sizes[n].size for n, v in effect.off.items() if effect.value(n) == v}
-    return effect.bind(off) if off and effect.moves else effect
-
-
 def _fit(
     problem: Problem, names: list[str], values: Mapping[str, float], model: Model, before: float
 ) -> RigFit:
@@ -132,14 +121,8 @@ def _fit(
         return np.concatenate([problem.residual(theta), known * x])
 
     lower, upper = _bounds(model, names, values, len(starts))
-    found = least_squares(
-        residual,
-        np.zeros(len(free)),
-        bounds=(lower, upper),
-        x_scale="jac",
-        diff_step=STEP,
-        method="trf",
-    )
+    start, bounds = np.zeros(len(free)), (lower, upper)
+    found = least_squares(residual, start, bounds=bounds, x_scale="jac", diff_step=STEP)
     rows = len(problem.rows())
     j, r = found.jac[:rows], found.fun[:rows]
     scale = np.maximum(np.linalg.norm(j, axis=0), 1e-300)
@@ -167,8 +150,7 @@ def _fit(
 def _bounds(
     model: Model, names: list[str], values: Mapping[str, float], starts: int
 ) -> tuple[Array, Array]:
-    """Smallest and largest change (k,) of the factors of figures such that a model can have them;
-    of what follows, how logs start, there is none."""
+    """Smallest and largest change (k,) of factors such that a model can have the figures."""
     ends = []
     for name in names:
         declared = model.parameters[name][0] if name in model.parameters else None

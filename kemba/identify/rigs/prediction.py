@@ -8,8 +8,8 @@ import numpy as np
 
 from kemba.effects.series import Series
 from kemba.identify.problem.candidates import CompiledModels, nominal_figures
+from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
-from kemba.identify.problem.types import Array, Candidate, Theta
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, Filtered, RigLog
 from kemba.model.model import Model
 from kemba.model.rest import StatesAlong

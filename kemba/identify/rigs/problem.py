@@ -22,8 +22,7 @@ from kemba.identify.problem.candidates import (
 )
 from kemba.identify.problem.missing_force import missing_along
 from kemba.identify.problem.noise import ColouredProblem, whiten
-from kemba.identify.problem.sensor_faults import is_straight
-from kemba.identify.problem.types import (
+from kemba.identify.problem.problem import (
     Array,
     Candidate,
     Flags,
@@ -34,6 +33,7 @@ from kemba.identify.problem.types import (
     Rows,
     Theta,
 )
+from kemba.identify.problem.sensor_faults import is_straight
 from kemba.identify.rigs.prediction import Predictor
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog, prepare
 from kemba.identify.rigs.validate import contradictions
@@ -42,22 +42,18 @@ from kemba.trajectory import Trajectory
 
 
 def standing_candidates(model: Model) -> dict[str, Candidate]:
-    """Effects by name that the model of the rig can have."""
-    return {n: c for n, c in effect_candidates(model).items() if stands(model, n)}
-
-
-def stands(model: Model, kind: str) -> bool:
-    """Whether the model can have the effect: some read what is not here, such as valves."""
-    try:
-        _ = model.with_effects([by_default(kind)]).node
-    except KembaError:
-        return False
-    return True
+    """Effects by name that the model can have: some read what is not here, such as valves."""
+    found = effect_candidates(model)
+    for kind in tuple(found):
+        try:
+            _ = model.with_effects([by_default(kind)]).node
+        except KembaError:
+            del found[kind]
+    return found
 
 
 def _sensor_sigmas(model: Model, logs: Sequence[RigLog]) -> dict[str, float]:
-    """Median noise of the channels whose sensors may be wrong. A drive's force is none of them: a
-    scale, an offset or a lag of the motor say the same."""
+    """Median noise of channels that may be wrong; a drive's force says what its motor does."""
     rig, found = model.mechanism.rig, {}
     for name in model.mechanism.logged:
         if name == ANSWER[rig] == "axis/tau":
@@ -100,10 +96,7 @@ def sized(
     for name, candidate in candidates.items():
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
-        if candidate.sensor:
-            trial = _with_units(candidate, predictor)
-        else:
-            trial = _with_units(_shaped(candidate, typical), predictor)
+        trial = candidate if candidate.sensor else _shaped(candidate, typical, predictor)
         theta = trial.typical()
         change = np.concatenate([predictor.gap(log, theta) for log in logs]) - base
         reach = float(np.percentile(np.abs(change), LARGE))
@@ -127,30 +120,21 @@ def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate
     return fast * candidate.lead.size < stretch[1]
 
 
-def _shaped(candidate: Candidate, typical: Mapping[str, float]) -> Candidate:
-    reach = CandidateSettings.reach
-    shapes = []
-    for shape in candidate.shapes:
-        name, declared = f"{candidate.effect}.{shape.name}", BY_KIND[candidate.effect].declared()
-        if name in typical:
-            low = max(typical[name] / reach, declared[shape.name].lower)
-            high = min(typical[name] * reach, declared[shape.name].upper)
-            shape = replace(shape, typical=typical[name], lower=low, upper=high)
-        shapes.append(shape)
-    return replace(candidate, shapes=tuple(shapes))
+def _shaped(candidate: Candidate, typical: Mapping[str, float], predictor: Predictor) -> Candidate:
+    """A candidate with these typical shapes, in the units of a rotary axis where it turns."""
+    reach, declared = CandidateSettings.reach, BY_KIND[candidate.effect].declared()
+    turns = predictor.model.mechanism.logged.get("axis/q") == "rad"
 
+    def fitting(p: Parameter) -> Parameter:
+        param, name = declared[p.name], f"{candidate.effect}.{p.name}"
+        unit = (turns and param.rotary) or p.unit
+        if name not in typical:
+            return replace(p, unit=unit)
+        ends = max(typical[name] / reach, param.lower), min(typical[name] * reach, param.upper)
+        return replace(p, unit=unit, typical=typical[name], lower=ends[0], upper=ends[1])
 
-def _with_units(candidate: Candidate, predictor: Predictor) -> Candidate:
-    """Parameters in the units of a rotary axis where the axis turns."""
-    if predictor.model.mechanism.logged.get("axis/q") != "rad" or candidate.sensor:
-        return candidate
-    declared = BY_KIND[candidate.effect].declared()
-
-    def turned(parameter: Parameter) -> Parameter:
-        return replace(parameter, unit=declared[parameter.name].rotary or parameter.unit)
-
-    shapes = tuple(turned(shape) for shape in candidate.shapes)
-    return replace(candidate, lead=turned(candidate.lead), shapes=shapes)
+    shapes = tuple(map(fitting, candidate.shapes))
+    return replace(candidate, lead=fitting(candidate.lead), shapes=shapes)
 
 
 def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]:
@@ -171,8 +155,7 @@ def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]
 
 
 def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[float, float]:
-    """Travel and phase of the sine of the position that explains most of the force which inertia,
-    friction and an offset leave."""
+    """Travel and phase of the sine that explains most beside inertia, friction, offset."""
     none: Theta = {}
     force = np.concatenate([-predictor.gap(log, none) for log in logs])
     q, v, a = (

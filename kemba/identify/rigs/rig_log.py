@@ -15,8 +15,9 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
+from kemba.identify.problem.missing_force import dahl
 from kemba.identify.problem.noise import difference_sigma
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -98,14 +99,15 @@ def filtered(
     force = max((float(np.std(y)) for y in others.values()), default=1.0)
     width = next(
         (s for s in WIDTHS
-         if _rate_noise(noise, step, s) <= CREEP * creep
-         and heavy * _bend_noise(noise, step, s) <= WEIGHT * force),
+         if _noise_of(1, noise, step, s) <= CREEP * creep
+         and heavy * _noise_of(2, noise, step, s) <= WEIGHT * force),
         WIDTHS[-1],
     )  # fmt: skip
-    quick = next((s for s in QUICK if _rate_noise(noise, step, s) <= CREEP * creep), width)
+    quick = next((s for s in QUICK if _noise_of(1, noise, step, s) <= CREEP * creep), width)
     names = list(others)
     parts, begins, rows, count = [], [], [], 0
-    for first, last in _stretches(time, GAP * step):
+    cuts = np.flatnonzero(np.diff(time) > GAP * step)
+    for first, last in zip([0, *(cuts + 1)], [*cuts, len(time) - 1], strict=True):
         n = int((time[last] - time[first]) / step) + 1
         if n < 2 * REACH * width + 3:
             continue
@@ -136,15 +138,15 @@ def filtered(
         table[3],
         dict(zip(names, table[6:], strict=True)),
         np.concatenate(rows),
-        GAIN[0] * noise / np.sqrt(width),
-        _rate_noise(noise, step, width),
-        _bend_noise(noise, step, width),
+        _noise_of(0, noise, step, width),
+        _noise_of(1, noise, step, width),
+        _noise_of(2, noise, step, width),
         sigma,
         width * step,
         np.array(begins),
         table[4],
         table[5],
-        _rate_noise(noise, step, quick),
+        _noise_of(1, noise, step, quick),
         quick * step,
     )
 
@@ -153,19 +155,9 @@ def _smooth(values: Array, width: float) -> Array:
     return np.asarray(gaussian_filter1d(values, width, truncate=REACH, mode="nearest"))
 
 
-def _rate_noise(sigma: float, step: float, width: int) -> float:
-    return float(GAIN[1] * sigma / (step * width**1.5))
-
-
-def _bend_noise(sigma: float, step: float, width: int) -> float:
-    return float(GAIN[2] * sigma / (step**2 * width**2.5))
-
-
-def _stretches(time: Array, longest: float) -> list[tuple[int, int]]:
-    """First and last row of every stretch without a longer step."""
-    cuts = np.flatnonzero(np.diff(time) > longest)
-    firsts, lasts = np.append(0, cuts + 1), np.append(cuts, len(time) - 1)
-    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+def _noise_of(order: int, sigma: float, step: float, width: int) -> float:
+    """Noise of the filtered position (0), its rate (1) or its acceleration (2)."""
+    return float(GAIN[order] * sigma / (step**order * width ** (order + 0.5)))
 
 
 ANSWER = {"cylinder": "piston/F", "drive": "axis/tau"}
@@ -207,7 +199,8 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     names = [name for name in mechanism.logged if name != place]
     given = log.meta.get("noise", {})
     known = {("" if name == place else name): sigma for name, sigma in given.items()}
-    heavy = _inertia(model)
+    # the rod of a cylinder is taken to have no inertia
+    heavy = float(model.parameters["drive_axis.J"][1]) if mechanism.rig == "drive" else 0.0
     turn = 2 * np.pi if mechanism.logged[place] == "rad" else np.inf
     others = {n: log[n] for n in names}
     found = filtered(log.time, log[place], others, mechanism.sign_speed, heavy, known, turn)
@@ -225,30 +218,9 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
         step = float(np.median(np.diff(found.time)))
-        held = 1.0 - np.abs(_stretch(found, DOUBTED * travel))
+        # contacts that slide after some travel; what was before a stretch is not known
+        parts = np.split(found.q, found.begins[1:])
+        held = 1.0 - np.abs(np.concatenate([dahl(q, DOUBTED * travel) for q in parts]))
         reach = 2 * int(np.ceil(BLURRED * found.width / step)) + 1
         doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])
     return RigLog(name, found, doubt)
-
-
-def _stretch(log: Filtered, travel: float) -> Array:
-    """Stretch (n,) of contacts that slide after some travel; 0 at the begin of every stretch of the
-    log, for what was before is not known."""
-    z, found = 0.0, np.zeros(len(log.q))
-    begins = set(log.begins.tolist())
-    way = np.append(0.0, np.diff(log.q))
-    for i, step in enumerate(way.tolist()):
-        if i in begins:
-            z = 0.0
-            continue
-        side = 1.0 if step > 0 else -1.0
-        z = side + (z - side) * float(np.exp(-abs(step) / travel))
-        found[i] = z
-    return found
-
-
-def _inertia(model: Model) -> float:
-    """Inertia of a drive, 0 of a cylinder: its rod is taken to have none."""
-    if model.mechanism.rig != "drive":
-        return 0.0
-    return float(model.parameters["drive_axis.J"][1])

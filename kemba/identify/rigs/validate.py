@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar, nnls
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.errors import KembaError
 from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, simplest
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
 

@@ -8,9 +8,8 @@ import numpy as np
 from kemba.effects.series import Series
 from kemba.identify.infer.refit import RefitSettings
 from kemba.identify.problem.candidates import CompiledModels, nominal_figures, sensor_candidates
-from kemba.identify.problem.problem import Problem, bounded
+from kemba.identify.problem.problem import Array, Problem, Rows, Theta, bounded
 from kemba.identify.problem.sensor_faults import SensorFaults
-from kemba.identify.problem.types import Array, Rows, Theta
 from kemba.identify.rigs.problem import standing_candidates
 from kemba.model.model import Model
 from kemba.model.rest import StatesAlong
@@ -129,10 +128,12 @@ class VesselProblem(Problem):
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""
         log = self.logs[index]
-        blow, values = self._blow_down.at(theta), self._values(theta)
+        blow, near = self._blow_down.at(theta), (1.0 / FARTHEST, FARTHEST)
+        values = self._blow_down.values(theta, blow.names)
+        for name in values.keys() & self.figures.keys():  # beyond, nothing can be predicted
+            values[name] = float(np.clip(values[name], *near))
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
-        far = FARTHEST
-        start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, 1.0 / far, far)
+        start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, *near)
         time, states = blow.run(log.begin, log.begin + log.duration, start, values)
         found = {}
         for name, (at, _) in log.readings.items():
@@ -154,12 +155,6 @@ class VesselProblem(Problem):
         nothing = np.full(len(run), "", dtype=object)
         units = {"vessel/P": "Pa", "vessel/T": "K"}
         return Rows(run, channel, time, label, nothing, names, sigma, units)
-
-    def _values(self, theta: Theta) -> dict[str, float]:
-        values = self._blow_down.values(theta, self._blow_down.at(theta).names)
-        least, most = 1.0 / FARTHEST, FARTHEST  # beyond, nothing can be predicted
-        return {n: float(np.clip(v, least, most)) if n in self.figures else v
-                for n, v in values.items()}  # fmt: skip
 
 
 def vessel_problem(

@@ -18,8 +18,9 @@ from scipy.ndimage import gaussian_filter1d
 from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS, SensorEffect, as_measured
 from kemba.effects.series import Series
+from kemba.identify.logs.reading import held
 from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 from kemba.trajectory import Trajectory
 
 SHORTEST = 0.7e-3  # denser rows are averaged [s]
@@ -63,42 +64,26 @@ def resample(
     keep = np.isfinite(log.time)
     time = log.time[keep]
     raw = np.stack([log[c][keep] for c in channels], axis=1)
-    torque = np.stack([_held(log[f"{leg}/hip/tau"][keep]) for leg in legs], axis=1)
+    torque = np.stack([held(log[f"{leg}/hip/tau"][keep]) for leg in legs], axis=1)
     valves = [f"{leg}/valve/{side}" for leg in legs for side in ("extend", "retract")]
-    sent = tuple(pulses(time, _held(log[v][keep])) for v in valves)
-    sigma = np.array([_sigma(log, c, raw[:, i]) for i, c in enumerate(channels)])
-    times = log.meta.get("noise_time") or {}
+    sent = tuple(pulses(time, held(log[v][keep])) for v in valves)
+    noise, times = (log.meta.get(key) or {} for key in ("noise", "noise_time"))
+    known = [noise.get(c, noise.get(f"{c} [{log.unit(c)}]")) for c in channels]
+    values = zip(channels, known, raw.T, strict=True)
+    sigma = np.array([_sigma(c, y) if k is None else float(k) for c, k, y in values])
     memory = np.array([times.get(c, np.nan) for c in channels])
-    stated = np.array([_stated(log, c) is not None for c in channels])
+    stated = np.array([k is not None for k in known])
     time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
     less = np.where(np.isfinite(memory), 1.0, np.sqrt(count))  # the mean of white noise is smaller
     return ResampledLog(name, time, raw, torque, sent, sigma / less, memory, stated)
 
 
-def _held(values: Array) -> Array:
-    """Commands with gaps filled by the last one sent."""
-    index = np.where(np.isfinite(values), np.arange(len(values)), 0)
-    return np.nan_to_num(values[np.maximum.accumulate(index)])
-
-
-def _sigma(log: Trajectory, channel: str, values: Array) -> float:
-    """Noise of one sample: as the sidecar says, else as its values tell, else the usual one."""
-    stated = _stated(log, channel)
-    if stated is not None:
-        return stated
+def _sigma(channel: str, values: Array) -> float:
+    """Noise of one sample as its values tell, else the usual one."""
     if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
         return CHANNELS[channel.split("/")[-1]][1]
     return max(difference_sigma(values), FINEST)
-
-
-def _stated(log: Trajectory, channel: str) -> float | None:
-    """Noise of a channel as the sidecar says, if it does."""
-    noise = log.meta.get("noise") or {}
-    for key in (channel, f"{channel} [{log.unit(channel)}]"):
-        if key in noise:
-            return float(noise[key])
-    return None
 
 
 def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:

@@ -15,7 +15,7 @@ from scipy.ndimage import (
 )
 
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 
 # When a foot touches the ground, and when a piston rests at a stop.
 # height below which a foot may touch [m]: a piston 0.5 mm wrong lifts the foot by 3 mm, a late
@@ -89,55 +89,38 @@ def read_schedule(
     speed = np.abs(slope(body, dt)).max(axis=1)
     blur, settle = max(1, round(BLUR / dt)), max(1, round(SETTLED / dt))
     near_stop = np.clip(STOP_NOISE * noise, NEAR_STOP, STOP_SEARCH / 2)
-    legs: list[tuple[Any, ...]] = []
-    for i in range(feet.shape[1]):
-        z, vx, vz = feet[:, i, 1], feet_rate[:, i, 0], feet_rate[:, i, 1]
-        level = ground_level(z, vz)
-        ground = np.maximum(level, _wandering_level(z, level, dt))
-        near = z < ground + MAY_TOUCH
-        touches = z < level + TOUCHES
-        may = _dilate(near, blur)
-        slow = np.abs(vz) < SLOW_FOOT
-        inner = _erode(z < level + STANDS, settle) & slow
-        struck = _after(may, STRIKE / dt)
-        on_ground = _erode(z < ground + STANDS, settle) & slow & ~struck
-        slips = on_ground & (np.abs(vx) > SLIDING)
-        slides = np.where(slips, np.sign(vx), 0.0)
-        slow_piston = np.abs(piston_rate[:, i]) < SLOW_PISTON
-        bottom, top = _stop_levels(pistons[slow_piston, i], stroke)
-        at_low = _closed(pistons[:, i] < bottom + near_stop[i], settle)
-        at_high = _closed(pistons[:, i] > top - near_stop[i], settle)
-        rests = _erode(at_low | at_high, 3 * blur) & slow_piston
-        legs.append(
-            (
-                may,
-                inner,
-                struck,
-                slides,
-                _dilate(at_low, 2),
-                _dilate(at_high, 2),
-                rests,
-                _erode(np.abs(vx) < STICKING, settle // 2),
-                touches,
-                _dilate(_after(touches, 1), round(IMPACT / dt)),
-            )
-        )
-    *parts, touches, impact = (np.stack(part, axis=1) for part in zip(*legs, strict=True))
-    may, settled, struck, slides, low, high, rests, sticks = parts
-    hit = [_after(at_stop, STRIKE / dt) for at_stop in (low | high).T]
+    z, vx, vz = feet[..., 1], feet_rate[..., 0], feet_rate[..., 1]
+    level = np.array([ground_level(*leg) for leg in zip(z.T, vz.T, strict=True)])
+    wandering = [_wandering_level(h, usual, dt) for h, usual in zip(z.T, level, strict=True)]
+    ground = np.maximum(level, np.stack(wandering, axis=1))
+    may, touches = _dilate(z < ground + MAY_TOUCH, blur), z < level + TOUCHES
+    slow, slow_piston = np.abs(vz) < SLOW_FOOT, np.abs(piston_rate) < SLOW_PISTON
+    struck = first_nodes(may, STRIKE / dt)
+    on_ground = _erode(z < ground + STANDS, settle) & slow & ~struck
+    slides = np.where(on_ground & (np.abs(vx) > SLIDING), np.sign(vx), 0.0)
+    places = zip(pistons.T, slow_piston.T, strict=True)
+    bottom, top = np.array([_stop_levels(x[still], stroke) for x, still in places]).T
+    at_low = _closed(pistons < bottom + near_stop, settle)
+    at_high = _closed(pistons > top - near_stop, settle)
+    low, high = _dilate(at_low, 2), _dilate(at_high, 2)
     # an impact shakes all loads: what a foot carries then is not known well enough to be judged
-    slides[struck.any(axis=1) | np.any(hit, axis=0)] = 0.0
+    slides[(struck | first_nodes(low | high, STRIKE / dt)).any(axis=1)] = 0.0
     count = touches.sum(axis=1)
     phase = np.array(["flight", "stance1", "stance2"], dtype=object)[np.minimum(count, 2)]
     phase[(count == feet.shape[1]) & (speed < SLOW_BODY)] = "rest"
-    phase[impact.any(axis=1)] = "impact"
+    phase[_dilate(first_nodes(touches, 1), round(IMPACT / dt)).any(axis=1)] = "impact"
+    settled = _erode(z < level + STANDS, settle) & slow
+    rests = _erode(at_low | at_high, 3 * blur) & slow_piston
+    sticks = _erode(np.abs(vx) < STICKING, settle // 2)
     return ContactSchedule(may, settled, struck, slides, low, high, phase, rests, sticks)
 
 
-def _after(flags: Flags, steps: float) -> Flags:
-    """Flags (n,) of the first `steps` nodes of each stretch in which `flags` (n,) hold."""
-    begin = flags & ~np.append(True, flags[:-1])
-    return np.asarray(np.convolve(begin, np.ones(max(1, round(steps))))[: len(flags)] > 0)
+def first_nodes(flags: Flags, steps: float) -> Flags:
+    """Flags (n, legs) of the first `steps` nodes of each stretch in which `flags` hold."""
+    begun, count = np.zeros((len(flags) + 1, flags.shape[1]), int), max(1, round(steps))
+    begun[2:] = np.cumsum(flags[1:] & ~flags[:-1], axis=0)
+    before = np.maximum(np.arange(1, len(begun)) - count, 0)
+    return np.asarray(begun[1:] > begun[before])
 
 
 def loaded(schedule: ContactSchedule, normal: Array, dt: float) -> ContactSchedule:
@@ -181,11 +164,7 @@ def ground_level(z: Array, rate: Array) -> float:
 
 
 def _wandering_level(z: Array, level: float, dt: float) -> Array:
-    """Height (n,) [m] of the lowest readings around each row, where that may still be the ground.
-
-    Sensors that drift lift a standing foot by a centimetre, and more than that from its usual
-    `level` [m].
-    """
+    """Height (n,) [m] of the lowest readings around each row, near the usual `level`."""
     width = max(3, round(LEVEL_TIME / dt))
     calm = uniform_filter1d(z, max(3, round(RATE_WINDOW / dt)), mode="nearest")
     low = maximum_filter1d(minimum_filter1d(calm, width), width)
@@ -193,9 +172,7 @@ def _wandering_level(z: Array, level: float, dt: float) -> Array:
 
 
 def _stop_levels(x: Array, stroke: float) -> tuple[float, float]:
-    """Readings [m] at the two stops: the extreme ones of x (n,) [m] of a slow piston, if they are
-    near the ends of the stroke. What is read of a fast one may lie behind its stop: smoothed, or
-    late and shifted, it overshoots."""
+    """Readings [m] at both stops: extremes of x (n,) of a slow piston, near the ends."""
     ordered = np.sort(x)
     few = min(STOP_ROWS, len(x) - 1)
     if few < 0:
@@ -206,7 +183,7 @@ def _stop_levels(x: Array, stroke: float) -> tuple[float, float]:
 
 
 def _dilate(flags: Flags, steps: int) -> Flags:
-    return np.asarray(binary_dilation(flags, np.ones(2 * steps + 1, bool)))
+    return np.asarray(binary_dilation(flags, np.ones((2 * steps + 1, 1), bool)))
 
 
 def _closed(flags: Flags, steps: int) -> Flags:
@@ -215,4 +192,4 @@ def _closed(flags: Flags, steps: int) -> Flags:
 
 
 def _erode(flags: Flags, steps: int) -> Flags:
-    return np.asarray(binary_erosion(flags, np.ones(2 * steps + 1, bool), border_value=1))
+    return np.asarray(binary_erosion(flags, np.ones((2 * steps + 1, 1), bool), border_value=1))

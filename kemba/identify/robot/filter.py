@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 
 # variance of a row that was not measured, over the largest variance: such a row tells nothing
 MISSING = 1e12

@@ -7,6 +7,8 @@ the contact forces are unknown too, so only the force that they cannot explain i
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -15,25 +17,27 @@ from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.compare.force_profiles import lags, risen
 from kemba.identify.problem.missing_force import dahl, end_terms, spans
-from kemba.identify.problem.types import (
+from kemba.identify.problem.problem import (
     Array,
     Changes,
     Flags,
     ForceChannel,
     MissingForce,
     OperatingPoint,
+    Problem,
     Rows,
     Texts,
     Theta,
 )
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.filter import System, gains, smooth_with_band
+from kemba.identify.robot.linear import scatter
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import QUIET, PlaceSettings, densities
 from kemba.identify.robot.state import LinearisedState
-from kemba.mechanism import Cylinder
 
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
+SIDES = ("extend", "retract")
 
 
 def _row_channels(physics: Physics) -> tuple[str, ...]:
@@ -44,76 +48,56 @@ def _row_channels(physics: Physics) -> tuple[str, ...]:
 
 def describe(state: LinearisedState) -> Rows:
     """Rows of the logs that are data, run by run, channel by channel."""
-    physics, batch, inputs = state.physics, state.batch, state.motion.states[1]
-    channels = _row_channels(physics)
-    m = len(channels)
-    found: dict[str, list[Texts]] = {}
-    for i, log in enumerate(batch.resampled):
-        own = state.mask[:, i].T
-        time = np.zeros(batch.n)
-        time[: len(log.time)] = log.time
-        phase = np.full(batch.n, "", dtype=object)
-        phase[: len(log.time)] = state.schedules[i].phase
-        sigma = np.append(log.sigma, [PlaceSettings.ground] * (m - len(log.sigma)))
-        whole = {
-            "run": np.full(own.shape, i),
-            "channel": np.broadcast_to(np.arange(m)[:, None], own.shape),
-            "time": np.broadcast_to(time, own.shape),
-            "phase": np.broadcast_to(phase, own.shape),
-            "mode": valve_modes(physics, inputs[:, i], channels).T,
-            "sigma": np.broadcast_to(sigma[:, None], own.shape),
-        }
-        for key, values in whole.items():
-            found.setdefault(key, []).append(values[own])
-    joined = {key: np.concatenate(parts) for key, parts in found.items()}
-    return Rows(channels=channels, **joined)  # type: ignore[arg-type]
+    batch, channels, shape = state.batch, _row_channels(state.physics), state.mask.shape
+    phase = np.full(shape[:2], "", dtype=object)
+    for i, schedule in enumerate(state.schedules):
+        phase[: len(schedule.phase), i] = schedule.phase
+    sigma = np.full(shape[1:], PlaceSettings.ground)
+    sigma[:, : batch.sigma.shape[1]] = batch.sigma
+    whole = {
+        "run": np.arange(shape[1])[:, None],
+        "channel": np.arange(len(channels)),
+        "time": batch.time[..., None],
+        "phase": phase[..., None],
+        "mode": valve_modes(state.physics, state.motion.states[1], channels),
+        "sigma": sigma,
+    }
+    rows = {key: state.pick(np.broadcast_to(values, shape)) for key, values in whole.items()}
+    return Rows(channels=channels, **rows)  # type: ignore[arg-type]
 
 
 def valve_modes(physics: Physics, inputs: Array, channels: Sequence[str]) -> Texts:
-    """Mode (n, m) of the channel's own leg; of the body: the first leg's."""
+    """Mode (n, L, m) of the channel's own leg; of the body: the first leg's."""
     texts = {}
     for leg in physics.legs:
-        on = [
-            inputs[:, physics.inputs.index(f"{leg}/valve/{side}")] > 0.5
-            for side in ("extend", "retract")
-        ]
-        texts[leg] = MODES[2 * on[0].astype(int) + on[1]]
+        extend, retract = (
+            inputs[..., physics.inputs.index(f"{leg}/valve/{side}")] > 0.5 for side in SIDES
+        )
+        texts[leg] = MODES[2 * extend.astype(int) + retract]
     first = physics.legs[0]
-    return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=1)
-
-
-def _air_force(states: Mapping[str, Array], cylinder: Cylinder, prefix: str = "") -> Array:
-    """Push of the air on a rod [N] from the chambers' states by name, in force or in pressure."""
-    push = []
-    areas = {"extend": cylinder.area_extend, "retract": cylinder.area_retract}
-    for chamber, area in areas.items():
-        name = f"{prefix}chamber/{chamber}/"
-        known = states.get(f"{name}F")
-        push.append((states[f"{name}P"] - ATMOSPHERE) * area if known is None else known)
-    return np.asarray(push[0] - push[1])
-
-
-SIDES = ("extend", "retract")
-
-
-def robot_operating_point(state: LinearisedState) -> OperatingPoint:
-    """The pistons along the motion on which the model was linearised."""
-    legs, motion = state.physics.legs, state.motion
-    pistons = slice(motion.y.shape[-1] - len(legs), None)
-    place = (motion.y[..., pistons], motion.rate[..., pistons], air_forces(state))
-    per_leg = np.moveaxis(np.stack(place, axis=-1), 2, 0)  # (legs, n, L, 3)
-    owners = [channel.split("/")[0] for channel in _row_channels(state.physics)]
-    own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
-    x, v, force = state.pick(np.stack(own, axis=2)).T
-    return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
+    return np.stack([texts.get(c.split("/")[0], texts[first]) for c in channels], axis=-1)
 
 
 def air_forces(state: LinearisedState) -> Array:
-    """Push of the model's air [N] on every leg's rod (n, L, legs)."""
+    """Push of the model's air [N] on every leg's rod (n, L, legs), by chambers' forces or
+    pressures."""
     names = [q.name for q in state.physics.model.states.values()]
     states = dict(zip(names, np.moveaxis(state.motion.states[0], -1, 0), strict=True))
-    cylinder, legs = state.physics.mechanism.need_cylinder(), state.physics.legs
-    return np.stack([_air_force(states, cylinder, f"{leg}/") for leg in legs], axis=-1)
+    cylinder = state.physics.mechanism.need_cylinder()
+
+    def push(name: str, area: float) -> Array:
+        known = states.get(f"{name}/F")
+        pressed = known is None
+        return np.asarray((states[f"{name}/P"] - ATMOSPHERE) * area if pressed else known)
+
+    return np.stack(
+        [
+            push(f"{leg}/chamber/extend", cylinder.area_extend)
+            - push(f"{leg}/chamber/retract", cylinder.area_retract)
+            for leg in state.physics.legs
+        ],
+        axis=-1,
+    )
 
 
 def changes(log: ResampledLog, legs: Sequence[str]) -> Changes:
@@ -132,62 +116,6 @@ BODY = {"body z": 1, "body x": 0}  # place among the channels
 USUAL_FORCE_BODY = 3.0  # on the body [N]
 HIP = 0.5  # at a hip [N.m]
 ROD = 10.0  # on a rod [N]: friction of 6 to 8 N by the paper's tables
-
-
-def robot_force_channels(state: LinearisedState) -> list[ForceChannel]:
-    """Rods and hips (both legs share a force profile), then the body along z and x.
-
-    A force is looked for where it shows: of hips and body in flight, of rods off their stops.
-    """
-    flying = [(s.phase == "flight").astype(float) for s in state.schedules]
-    where = state.batch.pad(flying, 0.0)[..., None] > 0.5
-    y, rate = state.motion.y, state.motion.rate
-    found = [_rods(state), _hips(state, where)]
-    for name, k in BODY.items():
-        quantities = {
-            "speed [m/s]": np.where(where, rate[..., [k]], np.nan),
-            "position [m]": np.where(where, y[..., [k]], np.nan),
-        }
-        found.append(
-            ForceChannel(name, "N", USUAL_FORCE_BODY, quantities, _force_columns(state, [k]))
-        )
-    return found
-
-
-def _rods(state: LinearisedState) -> ForceChannel:
-    motion, batch, legs = state.motion, state.batch, len(state.physics.legs)
-    stopped = batch.pad([(s.low | s.high).astype(float) for s in state.schedules], 1.0)
-    where = (stopped < 0.5) & batch.valid[..., None]
-    quantities = {
-        "speed [m/s]": motion.rate[..., 3 + legs :],
-        "position [mm]": 1e3 * motion.y[..., 3 + legs :],
-        "air force [N]": air_forces(state),
-    }
-    return ForceChannel(
-        "rods",
-        "N",
-        ROD,
-        {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        _force_columns(state, range(3 + legs, 3 + 2 * legs)),
-        {side: _after(state, f"valve/{side}") for side in SIDES},
-    )
-
-
-def _hips(state: LinearisedState, where: Flags) -> ForceChannel:
-    legs = range(3, 3 + len(state.physics.legs))
-    quantities = {
-        "speed [rad/s]": state.motion.rate[..., legs],
-        "angle [rad]": state.motion.y[..., legs],
-        "torque [N.m]": state.batch.torque,
-    }
-    return ForceChannel(
-        "hips",
-        "N.m",
-        HIP,
-        {label: np.where(where, values, np.nan) for label, values in quantities.items()},
-        _force_columns(state, legs),
-        {"hip/tau": _after(state, "hip/tau")},
-    )
 
 
 def _after(state: LinearisedState, command: str) -> Array:
@@ -217,25 +145,6 @@ SPEED = 0.1  # speed over which friction at a hip turns round [rad.s-1]
 CREEPS = (0.003, 0.006, 0.012)  # travel over which a hysteresis turns round [m]
 RIPPLES = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of the hip
 ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
-
-
-def formula_columns(state: LinearisedState) -> dict[str, Array]:
-    """Columns (rows,) per unit of the coefficient, by the formula a model's YAML would hold."""
-    y, rate = state.motion.y, state.motion.rate
-    legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
-    hips, rods = slice(3, 3 + legs), slice(3 + legs, 3 + 2 * legs)
-    groups = (
-        (range(3 + legs, 3 + 2 * legs), "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
-        (range(3, 3 + legs), "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
-        ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
-        ([0], "body x", _drag_terms("x", rate[..., [0]])),
-    )
-    found: dict[str, Array] = {}
-    for channels, name, terms in groups:
-        listed = list(terms)
-        columns = _force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
-        found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
-    return found
 
 
 def _rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
@@ -292,44 +201,123 @@ STRENGTHS = {
 }
 
 
-def robot_missing(
-    state: LinearisedState, theta: Theta, strength: Array | None = None
-) -> list[MissingForce]:
-    """d(t) per run: force on the body [N], moments at pitch and hips [N.m], force on the rods [N].
-
-    `strength` (k,): 1 sigma of each channel's force; learnt when not given.
-    """
-    names = state.physics.channels
-    usual = (STRENGTHS["/".join(name.split("/")[-2:])] for name in names)
-    units, begin, least = zip(*usual, strict=True)
-    sigma = np.array(begin) if strength is None else strength
-    quiet = densities(state.physics, state.batch, state.schedules, QUIET)
-    y, g = state.measurement(theta), state.acceleration(theta)
-    valid, k = state.batch.valid, len(names)
-    for _ in range(ROUNDS if strength is None else 1):
-        system = _with_forces(state, quiet, sigma)
-        x, variance = smooth_with_band(system, gains(system), y, g)
-        power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
-        ratio = np.sqrt(power) / sigma
-        # towards nothing such rounds creep, so that their steps are doubled
-        used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
-    found = []
-    for i, log in enumerate(state.batch.resampled):
-        n = len(log.time)
-        force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
-        down = spans(log.time, state.schedules[i].phase != "flight")
-        found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
-    return found
-
-
 def _with_forces(state: LinearisedState, density: Array, sigma: Array) -> System:
-    """The filter's system with a lagged force per channel, 1 sigma `sigma` (k,), as more states.
-
-    `density` (n, L, c): of the other unknown forces.
-    """
-    base = state.motion.system_with(density, state.batch.h)
-    keep = np.where(state.batch.valid, np.exp(-state.batch.h / MEMORY), 1.0)
+    """The filter's system with a lagged force per channel, `sigma` (k,), as more states."""
+    motion, h, k = state.motion, state.batch.h, state.motion.ref.q.shape[2]
+    base = replace(motion.system, W=motion.system.W.copy())
+    base.W[..., :k, :k] = scatter(motion.inverse @ motion.channels, density, h)
+    keep = np.where(state.batch.valid, np.exp(-h / MEMORY), 1.0)
     found, d = base.with_lags(keep[..., None], sigma), base.F.shape[-1]
-    pushes = state.motion.channels[..., : len(sigma)]  # generalised force per channel force
-    found.F[..., :d, d:] = base.G[..., : pushes.shape[2]] @ state.motion.inverse @ pushes
+    pushes = motion.channels[..., : len(sigma)]  # generalised force per channel force
+    found.F[..., :d, d:] = base.G[..., : pushes.shape[2]] @ motion.inverse @ pushes
     return found
+
+
+class RobotForces(Problem):
+    """What rows of robot logs are, and forces that may be missing; `state`: linearised logs."""
+
+    state: LinearisedState
+
+    def rows(self) -> Rows:
+        """What each row of `residual` is."""
+        return describe(self.state)
+
+    def commands(self) -> list[Changes]:
+        """Per run: command -> times and sizes of its changes."""
+        return [changes(log, self.state.physics.legs) for log in self.state.batch.resampled]
+
+    def operating_point(self) -> OperatingPoint:
+        """The piston of each row's leg along the motion; of the body's rows: the first leg's."""
+        state, legs, motion = self.state, self.state.physics.legs, self.state.motion
+        pistons = slice(motion.y.shape[-1] - len(legs), None)
+        place = (motion.y[..., pistons], motion.rate[..., pistons], air_forces(state))
+        per_leg = np.moveaxis(np.stack(place, axis=-1), 2, 0)  # (legs, n, L, 3)
+        owners = [channel.split("/")[0] for channel in _row_channels(state.physics)]
+        own = [per_leg[legs.index(o) if o in legs else 0] for o in owners]
+        x, v, force = state.pick(np.stack(own, axis=2)).T
+        return OperatingPoint(x, v, force, state.physics.mechanism.need_cylinder().stroke)
+
+    def force_channels(self) -> list[ForceChannel]:
+        """Rods and hips (both legs share a force profile), then the body along z and x.
+
+        A force is looked for where it shows: of hips and body in flight, of rods off their stops.
+        """
+        state, y, rate = self.state, self.state.motion.y, self.state.motion.rate
+        batch, legs = state.batch, len(state.physics.legs)
+        flying = [(s.phase == "flight").astype(float) for s in state.schedules]
+        flight = batch.pad(flying, 0.0)[..., None] > 0.5
+        stopped = batch.pad([(s.low | s.high).astype(float) for s in state.schedules], 1.0)
+        off_stops = (stopped < 0.5) & batch.valid[..., None]
+
+        def channel(
+            name: str, unit: str, usual: float, ports: slice, where: Flags,
+            values: dict[str, Array], after: Mapping[str, str] = MappingProxyType({}),
+        ) -> ForceChannel:  # fmt: skip
+            places = range(*ports.indices(y.shape[-1]))
+            seen = {label: np.where(where, value, np.nan) for label, value in values.items()}
+            rises = {label: _after(state, command) for label, command in after.items()}
+            return ForceChannel(name, unit, usual, seen, _force_columns(state, places), rises)
+
+        rods, hips = slice(3 + legs, 3 + 2 * legs), slice(3, 3 + legs)
+        at_rods = {"speed [m/s]": rate[..., rods], "position [mm]": 1e3 * y[..., rods],
+                   "air force [N]": air_forces(state)}  # fmt: skip
+        at_hips = {"speed [rad/s]": rate[..., hips], "angle [rad]": y[..., hips],
+                   "torque [N.m]": batch.torque}  # fmt: skip
+        sent = {side: f"valve/{side}" for side in SIDES}
+        found = [
+            channel("rods", "N", ROD, rods, off_stops, at_rods, sent),
+            channel("hips", "N.m", HIP, hips, flight, at_hips, {"hip/tau": "hip/tau"}),
+        ]
+        for name, k in BODY.items():
+            own = slice(k, k + 1)
+            at = {"speed [m/s]": rate[..., own], "position [m]": y[..., own]}
+            found.append(channel(name, "N", USUAL_FORCE_BODY, own, flight, at))
+        return found
+
+    def missing_force(
+        self, theta: Theta | None = None, strength: Array | None = None
+    ) -> list[MissingForce]:
+        """d(t) per run: force on the body and the rods [N], moments at pitch and hips [N.m].
+
+        `strength` (k,): 1 sigma of each channel's force; learnt when not given.
+        """
+        state, theta, names = self.state, theta or {}, self.state.physics.channels
+        usual = (STRENGTHS["/".join(name.split("/")[-2:])] for name in names)
+        units, begin, least = zip(*usual, strict=True)
+        sigma = np.array(begin) if strength is None else strength
+        quiet = densities(state.physics, state.batch, state.schedules, QUIET)
+        y, g = state.measurement(theta), state.acceleration(theta)
+        valid, k = state.batch.valid, len(names)
+        for _ in range(ROUNDS if strength is None else 1):
+            system = _with_forces(state, quiet, sigma)
+            x, variance = smooth_with_band(system, gains(system), y, g)
+            power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
+            ratio = np.sqrt(power) / sigma
+            # towards nothing such rounds creep, so that their steps are doubled
+            used, sigma = sigma, np.maximum(sigma * np.where(ratio < 1.0, ratio**2, ratio), least)
+        found = []
+        for i, log in enumerate(state.batch.resampled):
+            n = len(log.time)
+            force, spread = x[:n, i, -k:], np.sqrt(variance[:n, i, -k:])
+            down = spans(log.time, state.schedules[i].phase != "flight")
+            found.append(MissingForce(log.name, log.time, names, units, force, spread, used, down))
+        return found
+
+    def formulas(self, theta: Theta) -> dict[str, Array]:
+        """Simple terms on rods, hips and body: formula, as a model's YAML would hold it -> column
+        (n,), the same at every theta."""
+        state, y, rate = self.state, self.state.motion.y, self.state.motion.rate
+        legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
+        hips, rods = range(3, 3 + legs), range(3 + legs, 3 + 2 * legs)
+        groups = (
+            (rods, "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
+            (hips, "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
+            ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
+            ([0], "body x", _drag_terms("x", rate[..., [0]])),
+        )
+        found: dict[str, Array] = {}
+        for channels, name, terms in groups:
+            listed = list(terms)
+            columns = _force_columns(state, channels)(np.stack([f for _, f in listed], axis=-1))
+            found |= {f"{t} [{name}]": c for (t, _), c in zip(listed, columns.T, strict=True)}
+        return found

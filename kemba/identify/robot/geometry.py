@@ -15,8 +15,8 @@ import casadi as ca
 import numpy as np
 from scipy.optimize import least_squares
 
+from kemba.identify.problem.problem import Array, Candidate, Flags
 from kemba.identify.problem.sensor_faults import GEOMETRY
-from kemba.identify.problem.types import Array, Candidate, Flags
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
 from kemba.identify.robot.physics import Physics, SampleMap
@@ -114,8 +114,8 @@ class Standing:
 
     def heights(self, x: Array) -> tuple[Array, Array]:
         """Heights (n, legs) [m] of the feet, and their slopes (n, legs, k)."""
-        z, slopes = self._map(self.samples, x)
-        return z, slopes
+        heights, slopes = self._map(self.samples, x)
+        return heights, slopes
 
 
 def standing_lengths(
@@ -136,12 +136,12 @@ def standing_lengths(
     free = np.array([*lengths, *zeros, LONGER])
     width = np.array([*lengths, *zeros, LONGER * HELD])
     start = np.zeros(len(width))
-    most = _most_rows(standing.heights(start)[0])
+    most = len(_crowd(standing.heights(start)[0]))
     for i, size in enumerate(sizes.values()):
         for share in TRIED:
             trial = np.zeros(len(width))
             trial[i] = share * size
-            count = _most_rows(standing.heights(trial)[0])
+            count = len(_crowd(standing.heights(trial)[0]))
             if count > most:
                 most, start = count, trial
     x, cost, rows = _refined(standing, start, width)
@@ -174,8 +174,7 @@ def remarks(found: StandingLengths) -> list[str]:
 
 
 def _drawn(standing: Standing, x: Array, width: Array, rows: Flags) -> Iterator[float]:
-    """Costs of the fits with the lengths of the model: with zeros as exact as they are supposed to
-    be, and with the zero of the height, of the pitch, of the hips or of the pistons in doubt."""
+    """Costs of fits with the model's lengths: zeros as exact as supposed, or one kind in doubt."""
     first, legs = len(standing.names), standing.legs
     hips = list(range(first + 2, first + 2 + legs))
     doubts: Sequence[list[int]] = ([], [first + 1], [first], hips, [i + legs for i in hips])
@@ -196,11 +195,6 @@ def _only(
     return _refined(standing, begin, narrow, rows)
 
 
-def _most_rows(heights: Array) -> int:
-    """The most samples at one height near that of the ground."""
-    return len(_crowd(heights))
-
-
 def _crowd(heights: Array) -> Array:
     """The heights of the samples that stand at one height near that of the ground."""
     near = np.sort(heights[np.abs(heights) < LEVEL])
@@ -212,8 +206,7 @@ def _crowd(heights: Array) -> Array:
 def _refined(
     standing: Standing, x: Array, width: Array, rows: Flags | None = None
 ) -> tuple[Array, float, Flags]:
-    """The best x (k,) with prior widths (k,), half the sum of squares, and the samples (n, legs)
-    that stand; `rows`: which samples are known to."""
+    """The best x (k,) with prior widths (k,), its cost, and which samples stand (n, legs)."""
     weight = 1.0 / (NOISE * np.sqrt(TOGETHER))
     cost = 0.0
     for band in BANDS:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
-from kemba.identify.problem.types import Array, Flags
+from kemba.identify.problem.problem import Array, Flags
 from kemba.identify.robot.batch import Batch, travelled
 from kemba.identify.robot.contact import ContactSchedule, steady, steady_while
 from kemba.identify.robot.filter import FilterGains, System, smooth
@@ -45,7 +44,7 @@ class LinearisedMotion:
     sinking: Array  # (n, L, legs) speed of the feet, down, steady
     links: Array  # (n, L, k, figures) force per share by which a link's mass or inertia is off
     less_grip: Array  # (n, L, k) force that is missing per unit of friction coefficient
-    shift: Array  # (n, L, k) acceleration that the model adds to the reference's
+    shift: Array  # (n, L, k) acceleration that the model adds to the reference's; 0 at ends
     A: tuple[Array, Array]  # (n, L, k, k) each: slopes of the acceleration along q and v
     channels: Array  # (n, L, k, c) generalised force per unknown force: channels, then feet
 
@@ -56,20 +55,7 @@ class LinearisedMotion:
     def defect(self, force: Array) -> Array:
         """Acceleration (n, L, k) that the model adds to the reference's, with a force (n, L, k)
         that the motion needs beyond model and contact."""
-        return self._live_shift + self.response(force)
-
-    @cached_property
-    def _live_shift(self) -> Array:
-        """The shift (n, L, k) in nodes that are part of a run."""
-        live = np.any(self.inverse != 0.0, axis=(2, 3))[..., None]
-        return np.where(live, self.shift, 0.0)
-
-    def system_with(self, density: Array, h: Array) -> System:
-        """The filter's system with other densities (n, L, c) of unknown force; `h` (n, L) [s]."""
-        k = self.ref.q.shape[2]
-        W = self.system.W.copy()
-        W[..., :k, :k] = scatter(self.inverse @ self.channels, density, h)
-        return replace(self.system, W=W)
+        return self.shift + self.response(force)
 
     def with_noise(self, noise: Noise, batch: Batch) -> LinearisedMotion:
         """The same motion, read by sensors with this noise."""
@@ -132,7 +118,7 @@ def linearise_along(
     A_q, A_v = (-inverse @ batch.deep(a) for a in physics.call("stiffness", *mid, s, u, p=p))
     pressed = slip * np.maximum(normal, 0.0)
     less_grip = (pressed[..., None] * Jf[..., 0::2, :]).sum(axis=2)
-    unknown = scatter(inverse @ channels, density, batch.h)
+    unknown, ends = scatter(inverse @ channels, density, batch.h), _run_ends(batch)[..., None]
     system = _filter_system(batch, schedules, (Jy, Jf), (A_q, A_v), unknown)
     return LinearisedMotion(
         ref,
@@ -140,7 +126,7 @@ def linearise_along(
         states,
         coloured(system, noise, batch.sigma, batch.h),
         system,
-        np.where(_run_ends(batch)[..., None, None], 0.0, inverse),
+        np.where(ends[..., None], 0.0, inverse),
         contact,
         normal,
         y,
@@ -150,7 +136,7 @@ def linearise_along(
         steady(-feet_rate[..., 1::2], dt),
         batch.deep(physics.call("links", *mid)[0]),
         less_grip,
-        shift,
+        np.where(ends, 0.0, shift),
         (A_q, A_v),
         channels,
     )
@@ -163,12 +149,7 @@ def _filter_system(
     slopes: tuple[Array, Array],
     unknown: Array,
 ) -> System:
-    """States: deviations of q and v (n, L, 2 k), then the places where feet and stops stand.
-
-    `measured`: slopes of channels (n, L, m, k) and feet (n, L, 2 legs, k) along q. `slopes`: of the
-    acceleration along q and v (n, L, k, k). `unknown` (n, L, k, k): covariance of the acceleration
-    that unknown forces make.
-    """
+    """States: deviations of q, v (n, L, 2 k), then places where feet and stops stand."""
     (Jy, Jf), (A_q, A_v) = measured, slopes
     k, legs = Jy.shape[-1], Jf.shape[2] // 2
     places = 3 * legs  # x and z of each foot, and the stop on which each piston rests
@@ -220,12 +201,7 @@ def scatter(pushed: Array, density: Array, h: Array) -> Array:
 def _rigid_forces(
     channels: Array, density: Array, force: Array, k: int, legs: int
 ) -> tuple[Array, Flags]:
-    """Forces (n, L, 3 legs) [N] of the stops and then of the feet, and where these act.
-
-    `force` (n, L, k) is what the motion needs beyond the model. It is split among the `channels`
-    (n, L, k, c) with the smallest norm, each channel weighted by the `density` (n, L, c) of its
-    unknown force.
-    """
+    """Forces (n, L, 3 legs) [N] of stops, then feet, of least norm, and where they act."""
     settings = ContactForceSettings
     weighted = channels * density[..., None, :]
     S = weighted @ channels.swapaxes(-1, -2)

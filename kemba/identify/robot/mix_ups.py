@@ -23,7 +23,7 @@ from kemba.effects.pneumatics.switching import inverted
 from kemba.effects.sensors import SensorBias, SensorScale
 from kemba.errors import KembaError
 from kemba.identify.logs.local_fit import local_fit
-from kemba.identify.problem.types import Array, Theta
+from kemba.identify.problem.problem import Array, Theta
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.physics import Physics
 
@@ -280,8 +280,7 @@ def _zero(
     plain: str = "",
     also: Sequence[str] = (),
 ) -> MixUp:
-    """A zero (and a sign): what is true is sign * reading - zero; `also` has the sign alone. So has
-    `plain`, where `start` is the zero."""
+    """A zero (and a sign, which `also` has alone): true is sign * reading - zero."""
     if reach is None:
         reach = next((far for end, far in REACH.items() if names[0].endswith(end)), np.inf)
     bias = SensorBias(channel=names[0])
@@ -349,12 +348,7 @@ class _Feet:
         }
 
     def restless(self, some: Some, lengths: Theta | None = None) -> float | None:
-        """How far [m] feet are from the ground, and come within a window.
-
-        The lowest foot stands in most of the rows in which the ground carries the robot, and each
-        foot in a quarter of them at least: the largest of these quantiles. None where too few rows
-        tell it.
-        """
+        """How far [m] feet that should stand are from the ground and from rest."""
         found = self._restless(some, lengths)
         return None if found is None else float(max(found))
 
@@ -374,8 +368,7 @@ class _Feet:
         return np.append(nearest, np.quantile(far, 0.25, axis=0))
 
     def with_height(self, some: Some) -> Some:
-        """Mistakes of which that about the zero of the height is the one after which feet are on
-        the ground."""
+        """Mistakes with the zero of the height that puts feet on the ground."""
         if not any(np.isinf(m.reach) for m in some):
             return some
         places, rows = self._places(some)
@@ -383,8 +376,7 @@ class _Feet:
         return [m.at(lowest) if m.at and np.isinf(m.reach) else m for m in some]
 
     def fitted(self, mistake: MixUp) -> MixUp:
-        """A mistake about a zero within reach, with that after which feet stand best: those of the
-        legs that it is about, if it is about legs alone."""
+        """A mistake about a zero within reach, with the zero by which its legs stand best."""
         at, reach = mistake.at, mistake.reach
         if at is None or np.isinf(reach):
             return mistake
@@ -403,8 +395,7 @@ class _Feet:
         return at(float(best.x))
 
     def pairs(self, known: Some, fitted: Some) -> Iterator[Some]:
-        """Two mistakes each, about other columns; with the zeros `fitted` to each alone where they
-        are about different legs."""
+        """Two mistakes each about other columns, zeros `fitted` where legs differ."""
         legs = [self._legs(m) for m in known]
         for i, j in combinations(range(len(known)), 2):
             apart = legs[i] and legs[j] and legs[i].isdisjoint(legs[j])
@@ -418,16 +409,14 @@ class _Feet:
         return set() if "body" in whose else {legs.index(leg) for leg in whose}
 
     def is_effect(self, some: Some, least: float) -> bool:
-        """Whether these mistakes are no more than effects: a fault that a sensor may have, or less
-        than SMALL at the feet; `least` [m]: the latter of the zero of the height."""
+        """Whether it is no more than effects: a sensor's fault, or feet moved by little."""
         (places, rows), (as_read, _) = self._places(some), self._places([])
         away = np.linalg.norm(places[rows] - as_read[rows], axis=2)
         far = least if any(m.about == {"body/z"} for m in some) else SMALL
         return any(m.small for m in some) or float(np.mean(away, axis=0).max()) < far
 
     def _places(self, some: Some, lengths: Theta | None = None) -> tuple[Array, np.ndarray]:
-        """Places (n, legs, 2) of the feet [m], and the rows around which the ground carries the
-        robot for a window."""
+        """Places (n, legs, 2) of the feet [m], and rows around which the ground carries."""
         half, y = self.half, _changed(self.y, some)
         columns = np.stack([y[name] for name in self.physics.channels], axis=1)
         fall = local_fit(columns[:, 1], max(1, half // 2), self.step, 2, 2)

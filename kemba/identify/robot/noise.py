@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kemba.identify.problem.problem import Array
 from kemba.identify.problem.sensor_noise import (
     ChannelNoise,
     ColourSettings,
@@ -22,7 +23,6 @@ from kemba.identify.problem.sensor_noise import (
     pairs,
     weighted,
 )
-from kemba.identify.problem.types import Array
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.filter import FilterGains, System, innovations
 
@@ -70,13 +70,13 @@ WIDTH = 21  # nodes over which the power is averaged; odd
 LEAST = 0.02  # smallest power
 
 
-def expected_power(system: System, gain: FilterGains, seed: int = 0) -> Array:
+def expected_power(system: System, gain: FilterGains) -> Array:
     """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
 
     It is below 1 where the filter allows for contact forces that a steady stance does not need.
     The draws are few, so that their power is averaged over some nodes.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     y = simulated(system, DRAWS, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
     padded = np.pad(power, ((WIDTH // 2, WIDTH // 2), (0, 0), (0, 0)), mode="edge")
@@ -131,33 +131,19 @@ def learnt_noise(
     memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
     m = system.H.shape[2]
     for channel in range(channels):
-        y = _channel_noise(memories, channel, sigma, h, m)
+        draws = lag_noise(memories, h, settings.draws, np.random.default_rng(17 + channel))
+        y = np.zeros((*h.shape, m, len(memories) * settings.draws))  # memory 0 is white
+        y[:, :, channel] = sigma[:, channel, None] * draws.reshape(*h.shape, -1)
         seen = innovations(system, gain, y, None)
         parts = np.split(seen, len(memories), axis=-1)
         columns += [covariances(part, errors, counts) for part in parts]
         kinds += [Kind(channel, memory) for memory in memories]
     for i, push in enumerate(pushes):
-        seen = innovations(system, gain, None, _force_noise(settings.force, push, h))
+        force = lag_noise([settings.force], h, settings.draws, np.random.default_rng(5))
+        seen = innovations(system, gain, None, np.asarray(push[..., None] * force))
         columns.append(covariances(seen, errors, counts))
         kinds.append(Kind(channels + i, settings.force))
     return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
-
-
-def _channel_noise(
-    memories: Sequence[float], channel: int, sigma: Array, h: Array, m: int
-) -> Array:
-    """Noise (n, L, m, memories x draws) of one channel, of one stated sigma; `memories` [s]: 0 is
-    white."""
-    draws = lag_noise(memories, h, ColourSettings.draws, np.random.default_rng(17 + channel))
-    y = np.zeros((*h.shape, m, len(memories) * ColourSettings.draws))
-    y[:, :, channel] = sigma[:, channel, None] * draws.reshape(*h.shape, -1)
-    return y
-
-
-def _force_noise(memory: float, push: Array, h: Array) -> Array:
-    """Accelerations (n, L, k, draws) of one force of unit sigma."""
-    force = lag_noise([memory], h, ColourSettings.draws, np.random.default_rng(5))
-    return np.asarray(push[..., None] * force)
 
 
 class SensorNoiseSettings:

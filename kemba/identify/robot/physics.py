@@ -7,9 +7,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from kemba.identify.problem.candidates import leg_by_leg, link_figures, nominal_figures
-from kemba.identify.problem.types import Array, Flags, Theta
-from kemba.identify.robot.candidates import without_delay
+from kemba.identify.problem.candidates import (
+    leg_by_leg,
+    link_figures,
+    nominal_figures,
+    without_delay,
+)
+from kemba.identify.problem.problem import Array, Flags, Theta
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
@@ -30,8 +34,7 @@ class SampleMap:
         self._code = Native(given, {self._name: [ca.vertcat(*by_rows)]})
 
     def __call__(self, samples: Sequence[Array], p: Array | None = None) -> list[Array]:
-        """Arrays (N, rows) or (N, rows, columns) from samples (N, .); `p` (k,): the last input,
-        the same for every sample."""
+        """Arrays (N, rows[, columns]) from samples (N, .); `p` (k,): last input of all."""
         given = [*samples] if p is None else [*samples, p]
         count = len(samples[0])
         x = np.empty((count, sum(self._widths)))
@@ -168,8 +171,7 @@ class Physics:
         return np.repeat(late, 2, axis=0)  # both valves of a leg
 
     def _bounds(self, figures: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
-        """Smallest and largest value (k,) of every parameter; of `figures` what a linear estimate
-        may not leave: a negative area has no flow."""
+        """Smallest and largest value (k,) of every parameter; `figures` stay possible."""
         lower, upper = np.full(len(self.names), -np.inf), np.full(len(self.names), np.inf)
         for name, (value, sigma) in figures.items():
             i, reach = self.names.index(name), REACH * sigma
@@ -207,9 +209,7 @@ class Physics:
         return made
 
     def _feet(self) -> tuple[ca.SX, ca.SX, ca.SX]:
-        """Of every foot: place x and distance from the ground, which at a wall is far less than
-        the height above it (2 legs,); their rates and slopes (2 legs, n) along the ground and out
-        of it."""
+        """Of feet: x and distance from the ground; rates, slopes along it and out of it."""
         node, ground, found = self.node, self.mechanism.scene.ground, []
         for leg in self.legs:
             foot = ca.vertcat(*(node.outputs[f"{leg}/foot/{axis}"] for axis in "xz"))
@@ -277,23 +277,19 @@ class Physics:
         )
 
     def _knee(self, i: int, p: Array) -> tuple[Array, Array]:
-        """Piston extension and knee angle on a fine grid, the extension increasing; the same for
-        all p with the same lengths."""
+        """Piston extension, increasing, and knee angle on a grid; the same for equal lengths."""
         key = (i, p[self.lengths].tobytes())
         if key not in self._knees:
             self._knees = {k: v for k, v in self._knees.items() if k[1] == key[1]}
-            self._knees[key] = self._folded(i, p)
+            m, k = self.mechanism, 3 + len(self.legs) + i
+            low, high = m.coordinates[k].lower, m.coordinates[k].upper
+            grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)
+            q = np.zeros((len(grid), m.n))
+            q[:, k] = grid
+            x = self.call("measured", q, 0 * q, p=p)[0][:, k]
+            order = np.argsort(x)
+            self._knees[key] = x[order], grid[order]
         return self._knees[key]
-
-    def _folded(self, i: int, p: Array) -> tuple[Array, Array]:
-        m, k = self.mechanism, 3 + len(self.legs) + i
-        low, high = m.coordinates[k].lower, m.coordinates[k].upper
-        grid = np.sign(low + high) * np.linspace(0.0, FOLDED, 4001)
-        q = np.zeros((len(grid), m.n))
-        q[:, k] = grid
-        x = self.call("measured", q, 0 * q, p=p)[0][:, k]
-        order = np.argsort(x)
-        return x[order], grid[order]
 
     def arrange(self, torque: Array, valves: Array) -> Array:
         """Inputs (nu, N) in the model's order from torques (legs, N) and valves (2 legs, N)."""

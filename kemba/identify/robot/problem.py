@@ -2,16 +2,20 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import replace
 
 import numpy as np
 from typing_extensions import Self
 
-from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
-from kemba.identify.problem.candidates import sensor_candidates
-from kemba.identify.problem.problem import Problem, mean_slope
+from kemba.identify.problem.candidates import (
+    extended,
+    ground_of,
+    in_the_air,
+    robot_candidates,
+    sensor_candidates,
+)
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta, mean_slope
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
 from kemba.identify.problem.structure import (
     FIGURES,
@@ -20,26 +24,8 @@ from kemba.identify.problem.structure import (
     free_figures,
     with_orifices,
 )
-from kemba.identify.problem.types import (
-    Array,
-    Candidate,
-    Changes,
-    ForceChannel,
-    MissingForce,
-    OperatingPoint,
-    Rows,
-    Theta,
-)
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
-from kemba.identify.robot.candidates import extended, ground_of, in_the_air, robot_candidates
-from kemba.identify.robot.forces import (
-    changes,
-    describe,
-    formula_columns,
-    robot_force_channels,
-    robot_missing,
-    robot_operating_point,
-)
+from kemba.identify.robot.forces import RobotForces, describe
 from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
 from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.noise import (
@@ -51,7 +37,7 @@ from kemba.identify.robot.noise import (
 )
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import ForceDensity, first_reference
-from kemba.identify.robot.state import LinearisedState, learnt_from, linearise_at
+from kemba.identify.robot.state import learnt_from, linearise_at
 from kemba.identify.robot.validate import contradictions, mixed_commands, slightly_mixed_up
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
@@ -60,7 +46,7 @@ WINDOW = 20  # rows over which one-step errors are summed
 PREDICTED = 0.05  # time of a prediction that tells an error in a channel's unit [s]
 
 
-class RobotProblem(Problem):
+class RobotProblem(RobotForces):
     """`Problem` for robot logs; see the text of `kemba.identify.robot.state`.
 
     `state`: the logs with the model linearised along their motion. `lengths`: those at which feet
@@ -71,20 +57,18 @@ class RobotProblem(Problem):
 
     moves = True
     learns_colour = True
-    state: LinearisedState
 
     def __init__(
         self,
         logs: Sequence[Trajectory],
         model: Model,
-        unknown: ForceDensity | None = None,
         figures: Mapping[str, tuple[float, float]] | None = None,
     ) -> None:
         self.logs = tuple(logs)
         self.window = WINDOW  # innovations are one-step errors
-        self.model, self.unknown = model, unknown or ForceDensity()
-        if any(log.meta.get("torques") is False for log in logs):
-            self.unknown = replace(self.unknown, hip=10.0)  # N2.m2.s: 10 N.m for 0.1 s
+        blind = any(log.meta.get("torques") is False for log in logs)
+        # of hips without a logged torque N2.m2.s: 10 N.m for 0.1 s
+        self.model, self.unknown = model, ForceDensity(hip=10.0) if blind else ForceDensity()
         found = robot_candidates(model)
         effects = in_the_air(found)
         grip, ground = ground_of(model)
@@ -155,7 +139,7 @@ class RobotProblem(Problem):
         # usual figures: those found beside a share of the old chambers are distorted by it
         values = {p.name: p.typical for p in self.candidates[ORIFICE].shapes}
         model = with_orifices(self.model, values)
-        found = type(self)(self.logs, model, self.unknown, free_figures(values))
+        found = type(self)(self.logs, model, free_figures(values))
         dropped = {*FREE_THEN, *(set(robot_candidates(self.model)) - set(self.candidates))}
         left = found.candidates.items()
         found.candidates = {k: c for k, c in left if not {k, k.split(":")[0]} & dropped}
@@ -216,8 +200,7 @@ class RobotProblem(Problem):
         return np.stack([columns[n] for n in names], axis=-1)
 
     def _is_direct(self, name: str) -> bool:
-        """Whether the force is linear in it, and nothing else depends on it: shapes, states,
-        delays, lengths and what sensors show are not so."""
+        """Whether the force is linear in it, and nothing else depends on it."""
         physics = self.physics
         if moves_readings(name) or name in physics.moving or name in physics.base.delays:
             return False
@@ -229,10 +212,6 @@ class RobotProblem(Problem):
     def is_straight(self, name: str) -> bool:
         """Whether residuals are linear in it: effects without memory, bias and scale of sensors."""
         return self._is_direct(name) or is_straight(name)
-
-    def rows(self) -> Rows:
-        """What each row of `residual` is."""
-        return describe(self.state)
 
     def expected_power(self) -> Array:
         """Mean square (n,) that each row would have if the model were right."""
@@ -252,28 +231,15 @@ class RobotProblem(Problem):
             for i, channel in enumerate(self.physics.channels)
         }
 
-    def commands(self) -> Sequence[Changes]:
-        """Per run: command -> times and sizes of its changes."""
-        return [changes(log, self.physics.legs) for log in self.batch.resampled]
-
-    def operating_point(self) -> OperatingPoint:
-        """The piston of each row's leg; of the body's rows: the first leg's."""
-        return robot_operating_point(self.state)
-
-    def missing_force(
-        self, theta: Theta | None = None, strength: Array | None = None
-    ) -> list[MissingForce]:
-        """Forces on body and rods, moments at pitch and hips; `strength` (k,): 1 sigma each."""
-        return robot_missing(self.state, theta or {}, strength)
-
-    def force_channels(self) -> list[ForceChannel]:
-        """Where a force may be missing: on rods, hips and the body."""
-        return robot_force_channels(self.state)
-
     def validate(self) -> list[str]:
         """Which lengths make the feet stand, where they are not the model's, and what cannot be
         told where none stands. Raises BadData where a log contradicts itself or any model."""
-        if faults := self._faults():
+        faults = self.mixed  # columns by feet, then commands, then what no model explains
+        if not faults:
+            r, rows = self.residual(self.lengths), self.rows()
+            faults = list(mixed_commands(self.state, rows, r, self._left(self.physics)))
+            faults = faults or list(contradictions(self.state, rows, r, self._sensor_columns))
+        if faults:
             raise BadData(faults)
         zeros = (
             "wrong zeros of the height, the pitch, hips and pistons cannot be told from missing "
@@ -281,16 +247,6 @@ class RobotProblem(Problem):
         )
         all_fly = len(self.flights) == len(self.runs)
         return [f"no foot stands: {zeros}"] if all_fly else remarks(self.standing)
-
-    def _faults(self) -> list[KembaError]:
-        """What is wrong with the logs, the simplest first: columns by the feet alone, commands by
-        what the model leaves, then what no model explains."""
-        if self.mixed:
-            return self.mixed
-        r, rows = self.residual(self.lengths), self.rows()
-        if faults := list(mixed_commands(self.state, rows, r, self._left(self.physics))):
-            return faults
-        return list(contradictions(self.state, rows, r, self._sensor_columns))
 
     def _left(self, physics: Physics) -> Left:
         """What the model leaves of other logs; everything of a motion that it cannot follow."""
@@ -311,10 +267,6 @@ class RobotProblem(Problem):
         """Columns (n, k) of every sensor fault and every length, per size."""
         faults = [c for c in self.candidates.values() if moves_readings(c.key)]
         return self.jacobian(self.lengths, [c.key for c in faults]) * [c.lead.size for c in faults]
-
-    def formulas(self, theta: Theta) -> Mapping[str, Array]:
-        """Simple terms on rods, hips and body: formula -> column (n,), the same at every theta."""
-        return formula_columns(self.state)
 
 
 def robot_problem(

@@ -3,13 +3,12 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.robot.batch import Batch
-from kemba.identify.robot.contact import ContactSchedule, read_schedule
+from kemba.identify.robot.contact import ContactSchedule, first_nodes, read_schedule
 from kemba.identify.robot.filter import System, gains, smooth
 from kemba.identify.robot.physics import Physics
 
@@ -151,9 +150,10 @@ def densities(
         own = [least.body, least.body, least.pitch] + [least.hip] * legs + [least.rod] * legs
         density = np.tile(np.array(own + [0.0] * 2 * legs), (len(log.time), 1))
         rods = density[:, 3 + legs : 3 + 2 * legs]
-        rods += np.where(schedule.low | schedule.high, unknown.contact, 0.0)
-        rods += np.where((schedule.low | schedule.high) & schedule.struck, unknown.impact, 0.0)
-        rods += _edges(schedule.low | schedule.high)
+        stopped = schedule.low | schedule.high
+        rods += np.where(stopped, unknown.contact, 0.0)
+        rods += np.where(stopped & schedule.struck, unknown.impact, 0.0)
+        rods += np.where(first_nodes(stopped, unknown.edge), unknown.impact, 0.0)
         if schedule.phase[min(unknown.rest, len(schedule.phase) - 1)] != "rest":
             since = (log.time - log.time[0])[:, None]
             rods += unknown.air * np.exp(-2.0 * since / unknown.air_fades)
@@ -162,14 +162,3 @@ def densities(
         density[:, 3 + 2 * legs :] = np.repeat(feet, 2, axis=1)
         parts.append(density)
     return batch.pad(parts, 0.0)
-
-
-def _edges(flags: np.ndarray[Any, Any]) -> Array:
-    """Density (n, legs) in the nodes after a piston reaches a stop."""
-    unknown = ContactForceSettings
-    change = np.zeros(flags.shape, bool)
-    change[1:] = flags[1:] & ~flags[:-1]
-    wide = change.copy()
-    for shift in range(1, unknown.edge):
-        wide[shift:] |= change[:-shift]
-    return np.where(wide, unknown.impact, 0.0)

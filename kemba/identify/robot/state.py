@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
+from kemba.identify.problem.candidates import GRIP, SOFTNESS
+from kemba.identify.problem.problem import Array, Flags, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
 from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.identify.problem.types import Array, Flags, Theta
 from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole_rows
-from kemba.identify.robot.candidates import GRIP, SOFTNESS
 from kemba.identify.robot.contact import ContactSchedule, loaded
 from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
 from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
@@ -63,25 +63,19 @@ class Inputs:
     """One run cut at every switching.
 
     `h` (N,) [s]: steps of the integration; `given`: q, v and inputs (N, .) over them; `index` (n,)
-    of each node among them; `width` (n,) [s] of each node's step. `inputs` (n, nu): mean over each
-    node's step.
+    of each node among them; `width` (n,) [s] of each node's step.
     """
 
     h: Array
     given: tuple[Array, Array, Array]
     index: Index
     width: Array
-    inputs: Array
 
     def means(self, values: Array) -> Array:
         """(n, k): values (N, k) averaged over the step from each node."""
-        return _means(values, self.h, self.index, self.width)
-
-
-def _means(values: Array, h: Array, index: Index, width: Array) -> Array:
-    padded = np.append(values * h[:, None], 0 * values[:1], axis=0)
-    sums = np.add.reduceat(padded, index, axis=0)
-    return np.vstack([(sums / width[:, None])[:-1], values[-1:]])
+        padded = np.append(values * self.h[:, None], 0 * values[:1], axis=0)
+        sums = np.add.reduceat(padded, self.index, axis=0)
+        return np.vstack([(sums / self.width[:, None])[:-1], values[-1:]])
 
 
 def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
@@ -96,7 +90,7 @@ def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves).T
         width = np.append(np.diff(log.time), 1.0)
-        found.append(Inputs(h, (q, v, u), index, width, _means(u, h, index, width)))
+        found.append(Inputs(h, (q, v, u), index, width))
     return found
 
 
@@ -107,7 +101,7 @@ def air_states(
     that are asked for (None: all)."""
     moving = p[physics.moves]
     states = [d.means(physics.states.run(d.h, *d.given, moving, among)) for d in inputs]
-    return batch.pad(states, 0.0), batch.pad([d.inputs for d in inputs], 0.0)
+    return batch.pad(states, 0.0), batch.pad([d.means(d.given[2]) for d in inputs], 0.0)
 
 
 def _at(time: Array, values: Array, times: Array) -> Array:
@@ -228,11 +222,6 @@ class LinearisedState:
     # what was `seen` with the lengths asked for last: a column of slopes seldom changes them
     _last_seen: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
-    @cached_property
-    def _at_base(self) -> Array:
-        """Free parameters (k,) where the model was linearised."""
-        return self.physics.at(self.base)
-
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
         theta see it; NaN where nothing was measured."""
@@ -247,9 +236,7 @@ class LinearisedState:
     def seen(self, theta: Theta) -> tuple[Array, Array]:
         """Channels (n, L, k), and places (n, L, 3 legs) of feet and pistons, along the reference,
         of a robot with the lengths at theta."""
-        p = self.physics.at(theta)
-        at = self._at_base
-        own = self.physics.lengths
+        p, at, own = self.physics.at(theta), self.physics.at(self.base), self.physics.lengths
         if np.array_equal(p[own], at[own]):
             return self.motion.y, self.motion.places
         key = p[own].tobytes()
@@ -359,7 +346,9 @@ def linearise_at(
     batch = batch.moved(rows)
     if first is None or rows.any():
         first = first_reference(physics, batch, p)
-    reference = _without_delays(batch, late - rows * dt, first)
+    rates = ((first.q, first.v), (first.v, first.a), (first.a, np.zeros_like(first.a)))
+    on_time = (ahead(a, rate, batch.resampled, late - rows * dt) for a, rate in rates)
+    reference = Reference(*on_time)  # as sensors that are not late would have seen it
     schedules = read_schedules(physics, batch, reference, p)
     for _ in range(ROUNDS):
         state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
@@ -374,12 +363,6 @@ def linearise_at(
     links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in links}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
-
-
-def _without_delays(batch: Batch, late: Array, ref: Reference) -> Reference:
-    """The reference as sensors that are not `late` (k,) [s] would have seen it."""
-    rates = ((ref.q, ref.v), (ref.v, ref.a), (ref.a, np.zeros_like(ref.a)))
-    return Reference(*(ahead(a, rate, batch.resampled, late) for a, rate in rates))
 
 
 def _along(

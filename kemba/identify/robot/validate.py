@@ -12,7 +12,7 @@ from scipy.optimize import lsq_linear
 
 from kemba.errors import KembaError
 from kemba.identify.infer.windows import rms
-from kemba.identify.problem.types import Array, Flags, Rows
+from kemba.identify.problem.problem import Array, Flags, Rows
 from kemba.identify.robot.batch import Batch, ResampledLog
 from kemba.identify.robot.mix_ups import (
     SAME,
@@ -151,8 +151,7 @@ def _power(channels: Sequence[str], r: Array, rows: Rows, own: Flags) -> dict[st
 
 
 def _forgiven(r: Array, columns: Array) -> Array:
-    """The residual (n,) less what faults of sensors can explain: these are to be found, not
-    refused. `columns` (n, k) per size of each fault."""
+    """The residual (n,) less what sensors' faults, `columns` (n, k) per size, explain."""
     gram = columns.T @ columns + 1e-9 * np.eye(columns.shape[1])
     lower = np.linalg.cholesky(gram)
     wanted = np.linalg.solve(lower, -columns.T @ r)

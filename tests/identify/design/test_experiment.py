@@ -52,7 +52,7 @@ def test_the_designed_test_is_short_and_better_per_second(
     standard, designed = found.standard, found.designed
     assert found.chosen is designed and found.nats > 5 and "decisive" in found.sentence
     assert designed.log_s <= min(2.0, 0.5 * standard.log_s) and designed.pace > standard.pace
-    assert "locked" not in standard.rig.name  # a rod at rest shows neither
+    assert "locked" not in standard.test.name  # a rod at rest shows neither
     assert load_rig(tmp_path / "next.yaml").notes == found.sentence
     assert any("tests tried" in text for text in told)
     facts = found.json()
@@ -136,5 +136,5 @@ def test_the_twin_agrees(tmp_path: Path, truth: str, other: str, short_search: N
     design = design_rig_test(model, rivals, bounded=False)
     assert design is not None
     assert design.designed.log_s <= 0.5 * design.standard.log_s
-    logs = machine.done(design.designed.rig, stroke, tmp_path / "next")
+    logs = machine.done(design.designed.test, stroke, tmp_path / "next")
     assert measured_evidence(problem_of(logs, model), rivals, truth, other) > 5.0

@@ -75,7 +75,7 @@ def test_the_twin_agrees_on_a_hip(tmp_path: Path) -> None:
         found = propose_motion(tmp_path, tmp_path / "next.yaml", bounded=False)
     assert found.nats >= found.standard.evidence.least and found.nats > 1.0
     table = tmp_path / "controller.csv"
-    controller(found.model, found.best.sway).write(table)
+    controller(found.model, found.designed.test).write(table)
     hidden = {"kind": "hip_friction", "parameters": {"T_c": 0.9}}
     script = from_table(table, "sway")
     paths, _ = robot_case(tmp_path / "logs", hidden, seed=5, runs=3, scripts=[script])

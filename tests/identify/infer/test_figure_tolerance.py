@@ -5,7 +5,7 @@ import pytest
 
 from kemba.identify.infer.linear import Linear
 from kemba.identify.infer.spike_slab import NULL, Ranker
-from kemba.identify.problem.types import Candidate, Parameter
+from kemba.identify.problem.problem import Candidate, Parameter
 
 SUPPLY = Candidate("supply", Parameter("k", size=0.1))
 

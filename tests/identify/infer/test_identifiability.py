@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.design.menu import splitting_test
 from kemba.identify.discover import discover, what_shows
-from kemba.identify.infer.identifiability import expected
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.significance import null_test
+from kemba.identify.infer.significance import expected, null_test
 from kemba.identify.infer.spike_slab import NULL, Ranker
+from kemba.identify.preview import splitting_test
 
 
 def prepared(problem: Toy) -> Search:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kemba.identify.infer.significance import LeftOutNoiseSettings, left_out_noise
-from kemba.identify.problem.types import Array, Labels
+from kemba.identify.problem.problem import Array, Labels
 
 BLOCKS, ROWS, EFFECTS = 24, 50, 12
 LABELS = np.repeat(np.arange(BLOCKS), ROWS)

@@ -8,8 +8,7 @@ from kemba.identify.infer.joint import joint_fit
 from kemba.identify.infer.linear import linearise, time_blocks
 from kemba.identify.infer.mode import mode_of
 from kemba.identify.infer.spike_slab import NULL, Ranker
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 
 ROW, RUNS = 1e-3, 3  # s
 EDGES = 0.0505 + 0.04 * np.arange(18)  # s, between two rows; up and down in turn

@@ -122,7 +122,7 @@ def test_an_answer_that_leaves_much_of_the_error_is_not_the_whole(
     problem = Toy({"kick.a": size}, seed=4)
     rng = np.random.default_rng(5)
     problem.measured += np.sqrt(noise**2 - 1.0) * rng.standard_normal(len(problem.measured))
-    found = caveats_of(searched(problem), Selection(("kick",)), None, None)
+    found = caveats_of(searched(problem), Selection(("kick",)), None)
     assert verdict_on(("kick",), None, found) == verdict
     if verdict != "missing":
         (doubt,) = found.reasons
@@ -141,7 +141,7 @@ def test_a_significant_error_that_nothing_explains_is_not_called_small(
     problem.measured += np.sqrt(noise**2 - 1.0) * np.random.default_rng(5).standard_normal(
         len(problem.measured)
     )
-    found = caveats_of(searched(problem), Selection(NULL, p_value), None, None)
+    found = caveats_of(searched(problem), Selection(NULL, p_value), None)
     assert verdict_on(NULL, None, found) == verdict
 
 

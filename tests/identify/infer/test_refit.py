@@ -7,8 +7,7 @@ from toy_problem import Toy
 
 from kemba.identify.infer.refit import Frozen, refit
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
-from kemba.identify.problem.problem import Problem
-from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 
 
 class Lag(Problem):

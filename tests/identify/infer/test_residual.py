@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from kemba.identify.compare.force_profiles import ForceProfile
-from kemba.identify.infer import residual as rest
 from kemba.identify.infer import verdict
 from kemba.identify.infer.selection import Selection
 
@@ -17,14 +16,14 @@ def left(monkeypatch: pytest.MonkeyPatch, gain: float, force: float, error: floa
     profile = ForceProfile(
         "rods", "N", "speed [m/s]", np.zeros(2), values, np.full(2, 1e-3), gain, 10.0
     )
-    monkeypatch.setattr(rest, "force_profiles", lambda problem, residual: [profile])
+    monkeypatch.setattr(verdict, "force_profiles", lambda problem, residual: [profile])
     fit = SimpleNamespace(theta={})
     found = SimpleNamespace(fitted_error=error, log_evidence=100.0, fit=fit)
     search = SimpleNamespace(
         points={("seal_friction",): found, (): SimpleNamespace(log_evidence=0.0)},
         problem=SimpleNamespace(residual=lambda theta: np.zeros(4)),
     )
-    return rest.pattern_left(search, ("seal_friction",))  # type: ignore[arg-type]
+    return verdict.pattern_left(search, ("seal_friction",))  # type: ignore[arg-type]
 
 
 def test_a_force_that_goes_with_speed_is_a_pattern(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,9 +57,9 @@ def test_half_is_asked_where_much_is_left_that_repeats_itself(
     best = ("both_mode_loss",)
     errors = dict(zip(((), best), error, strict=True))
     structure = {(): (7.0, 5.9), best: (1.0, repeats)}
-    monkeypatch.setattr(rest, "_structured", lambda search, hypothesis: structure[hypothesis])
+    monkeypatch.setattr(verdict, "_structured", lambda search, hypothesis: structure[hypothesis])
     monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
     monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "a force after extend")
     monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
-    caveats = verdict.caveats_of(SimpleNamespace(), Selection(best), None, None)  # type: ignore[arg-type]
+    caveats = verdict.caveats_of(SimpleNamespace(), Selection(best), None)  # type: ignore[arg-type]
     assert verdict.verdict_on(best, None, caveats) == said

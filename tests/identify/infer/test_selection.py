@@ -147,7 +147,7 @@ def test_rivals_that_left_out_data_cannot_tell_are_named() -> None:
     assert best in found.dismissed and found.remarks
     nats = search.points["drag",].log_evidence - search.points["twin",].log_evidence
     assert nats > 10.0
-    caveats = caveats_of(search, found, None, None)
+    caveats = caveats_of(search, found, None)
     assert verdict_on(found.best, None, caveats) == "partly"
     assert equivalents(search, found, "drag") == ("twin",)
 

@@ -5,7 +5,7 @@ import pytest
 
 from kemba.identify.infer.linear import Linear
 from kemba.identify.infer.spike_slab import Ranker
-from kemba.identify.problem.types import Candidate, Parameter
+from kemba.identify.problem.problem import Candidate, Parameter
 
 
 def ranker() -> Ranker:

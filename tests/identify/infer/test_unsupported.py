@@ -42,7 +42,7 @@ def test_a_search_that_the_limit_ended_is_not_sure_of_a_sensor(
     search = Search(bench_problem([log], load_model(rig=True)))
     search.start()
     search.visit(scale)
-    caveats = caveats_of(search, Selection(scale), None, None, ended)
+    caveats = caveats_of(search, Selection(scale), None, ended)
     said = (verdict_on(scale, None, caveats), caveats.reasons, caveats.unsure)
     assert said == (("partly", (ENDED,), scale) if ended else ("missing", (), ()))
 
@@ -56,9 +56,9 @@ def test_of_several_effects_that_were_not_asked_one_by_one_none_is_sure(
     search.start()
     for answer in (FRICTION, both):
         search.visit(answer)
-    caveats = caveats_of(search, Selection(both), None, None, ended=search.late)
+    caveats = caveats_of(search, Selection(both), None, ended=search.late)
     assert ENDED in caveats.reasons and caveats.unsure == both
-    assert caveats_of(search, Selection(FRICTION), None, None, ended=search.late).unsure == ()
+    assert caveats_of(search, Selection(FRICTION), None, ended=search.late).unsure == ()
 
 
 def test_what_left_out_data_do_not_need_is_not_named() -> None:

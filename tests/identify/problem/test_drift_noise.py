@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from kemba.identify.problem.noise import DriftNoise, colours, whitened
-from kemba.identify.problem.types import Rows
+from kemba.identify.problem.problem import Rows
 
 TIME = np.arange(2000) / 1e3
 

@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from kemba.identify.problem.problem import Problem, mean_slope
-from kemba.identify.problem.types import Array, Candidate, Parameter, Rows, Theta
+from kemba.identify.problem.problem import (
+    Array,
+    Candidate,
+    Parameter,
+    Problem,
+    Rows,
+    Theta,
+    mean_slope,
+)
 
 ROW = 1e-3  # s
 EDGES = (0.0505, 0.1205, 0.3105)  # s, between two rows

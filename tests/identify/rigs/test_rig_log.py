@@ -22,11 +22,10 @@ def test_the_filter_knows_the_rate_the_inertia_the_noise_and_the_turn(
         asked.update(creep=creep, heavy=heavy, known=known, turn=turn, others=set(others))
 
     monkeypatch.setattr(rig_log, "filtered", none)
-    monkeypatch.setattr(rig_log, "_inertia", lambda _: 3.0)
     mechanism = SimpleNamespace(
         rig="drive", logged={"axis/q": unit, "axis/tau": "N"}, sign_speed=0.25
     )
-    model: Any = SimpleNamespace(mechanism=mechanism)
+    model: Any = SimpleNamespace(mechanism=mechanism, parameters={"drive_axis.J": (None, 3.0)})
     columns = {f"axis/q [{unit}]": np.zeros(5), "axis/tau [N]": np.ones(5)}
     noise = {"axis/q": 1e-4, "axis/tau": 0.5}
     with pytest.raises(BadData, match="no stretch without gaps"):

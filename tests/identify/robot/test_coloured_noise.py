@@ -10,7 +10,7 @@ from twin import catalogue, measure
 
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
-from kemba.identify.infer.colour import DriftSettings, log_likelihood, with_learnt_colour
+from kemba.identify.infer.null_model import DriftSettings, log_likelihood, with_learnt_colour
 from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.robot.noise import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem

@@ -8,7 +8,7 @@ from robot_logs import hops
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_log
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

@@ -9,7 +9,7 @@ import pytest
 from robot_logs import hops
 
 from kemba.errors import KembaError
-from kemba.identify.problem.types import Array
+from kemba.identify.problem.problem import Array
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.mix_ups import mix_ups, mixed_up
 from kemba.identify.robot.physics import Physics
