@@ -5,30 +5,19 @@ and it changes little where walls rise by little: continuation in one parameter,
 scene's heights, with steps that double where one is solved and halve where it is not (Allgower and
 Georg, Introduction to Numerical Continuation Methods, SIAM 2003). Phases of contacts and valves are
 read anew only where the smallest step is not solved on them: a smaller step costs a tenth of that.
-Legs are to fold from the first as they will in the scene, or the valves that fold them are not
-there when it rises: in the middle of the flight feet are as high as the highest that is ahead.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from kemba.config import Document
-from kemba.model import Model
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import continued
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import asked_of
-from kemba.ocp.task.moments import spans
-from kemba.ocp.task.requirement import Requirement, highest, quantities
 from kemba.ocp.task.task import Task
-from kemba.ocp.task.templates import longest_leg
-from kemba.scene.scene import EDGE
 
 FIRST = 1 / 8  # of the heights, by the first step
 LEAST = 1 / 64  # the smallest step: 2 mm of a wall of 15 cm
@@ -67,39 +56,12 @@ def raised(found: Plan, planner: Planner, document: Document) -> Plan | None:
 
 
 def lowered(planner: Planner, document: Document, share: float) -> Planner:
-    """The planner with a `share` of its scene's heights; with feet that fold below the whole."""
+    """The planner with a `share` of its scene's heights."""
     if share == 1.0:
         return planner
     task = planner.task
     scene = task.scene.lowered(share, task.place_x)
     own = task.model_copy(update={"terrain": scene.terrain, "obstacles": scene.obstacles})
     model, asked = asked_of(own, document)
-    asked += folded(task, model, asked)
     lags = planner.lags and asked_of(own, document, lags=True)
-    lags = lags and (lags[0], lags[1] + folded(task, *lags))
     return replace(planner, task=own, model=model, requirements=asked, lags=lags, outcome=None)
-
-
-def folded(task: Task, model: Model, asked: Sequence[Requirement]) -> list[Requirement]:
-    """Every foot as high in the middle of the flight as the highest wall or obstacle on the way
-    asks for; nothing where there is none, or neither a goal nor `contacts` say when that is."""
-    apex, rise = highest(asked), _highest_wall(task, model)
-    parts = zip(task.contacts, spans(task.contacts), strict=True)
-    flights = [sum(span) / 2.0 for part, span in parts if not part.on]
-    moment = apex.at if apex is not None else next(iter(flights), None)
-    if rise < EDGE or moment is None:
-        return []
-    rise += task.clearance or 0.0
-    known = quantities(model)
-    feet = (known[f"{leg}/foot/gap"] for leg in model.mechanism.legs)
-    return [Requirement(("feet",), foot, moment, rise, math.inf) for foot in feet]
-
-
-def _highest_wall(task: Task, model: Model) -> float:
-    """The most [m] by which what a foot must pass rises within an edge, on the way of the feet."""
-    robot, way = model.mechanism.need_robot(), task.distance or 0.0
-    reach = max(abs(leg.hip) for leg in robot.legs.values()) + longest_leg(robot)
-    first, last = sorted((task.place_x, task.place_x + way))
-    x = np.arange(first - reach, last + reach, EDGE / 20)
-    rises = task.scene.skyline(x + math.copysign(EDGE, way)) - task.scene.skyline(x)
-    return float(rises.max() if way else 0.0)

@@ -157,10 +157,18 @@ def test_what_keys_ask_by_themselves_has_its_line_and_figure() -> None:
 
 
 @pytest.mark.parametrize(
-    ("early", "scuff", "parts"), [(0, 0.0, 3), (1, 0.0, 3), (3, 0.0, 1), (0, 50.0, 1)]
+    ("early", "scuff", "between", "parts"),
+    [
+        (0, 0.0, [], 3),
+        (1, 0.0, [], 3),
+        (1, 0.0, ["rear"], 4),  # that the rear feet leave last is asked
+        (0, 0.0, ["rear"], 1),
+        (3, 0.0, [], 1),
+        (0, 50.0, [], 1),
+    ],
 )
 def test_feet_leave_together_to_within_what_is_an_event(
-    early: int, scuff: float, parts: int
+    early: int, scuff: float, between: list[str], parts: int
 ) -> None:
     """A front foot that leaves some nodes, of 13 to 19 ms, before the rear one; or one that touches
     in flight for as long, with a force [N]."""
@@ -174,7 +182,8 @@ def test_feet_leave_together_to_within_what_is_an_event(
     changed = run.plan.with_columns(forces)
     columns = {h: changed[n] for h, n in zip(changed.headers, changed.names, strict=True)}
     plan = Trajectory(0.9 * changed.time, columns, changed.meta)
-    contacts = [{"on": ["rear", "front"]}, {"on": "air"}, {"on": ["rear", "front"]}]
+    last = [{"on": leg} for leg in between]
+    contacts = [{"on": ["rear", "front"]}, *last, {"on": "air"}, {"on": ["rear", "front"]}]
     task = Task.model_validate(
         {"duration": run.task.duration, "nodes": run.task.nodes, "contacts": contacts}
     )

@@ -135,30 +135,3 @@ def test_level_ground_and_the_scene_take_turns(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("kemba.ocp.planning.raised", lambda *_: None)
     list(planning.plans())
     assert made[:4] == ["level", "scene", "level", "scene"]
-
-
-@pytest.mark.parametrize(
-    ("task", "settings", "moment", "height"),
-    [
-        ("hurdle.yaml", [], 0.5, 0.2 + 0.03 + 0.03),  # kept around it, and the clearance
-        ("platform.yaml", [], 0.525, 0.15 + 0.03),  # the middle of the flight by its contacts
-        (
-            "platform.yaml",
-            ["contacts=[]", "clearance=0 m"],
-            None,
-            0.0,
-        ),  # nothing says when it flies
-        ("drop_off.yaml", [], None, 0.0),
-        ("jump_forward.yaml", ["terrain=[{slope: 10 deg}]"], None, 0.0),
-    ],
-)
-def test_legs_fold_on_level_ground_where_a_wall_is_ahead(
-    task: str, settings: list[str], moment: float | None, height: float
-) -> None:
-    planner = Planning.of(*load_task(task, settings)).planner
-    asked = raised.folded(planner.task, planner.model, planner.requirements)
-    assert {r.quantity.name for r in asked} == (
-        {"front/foot/gap", "rear/foot/gap"} if moment is not None else set()
-    )
-    for one in asked:
-        assert one.at == pytest.approx(moment) and one.lower == pytest.approx(height, abs=1e-4)

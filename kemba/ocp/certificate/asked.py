@@ -267,21 +267,22 @@ def _of_the_task(
 def _stances_in_order(task: Task, plan: Trajectory) -> int:
     """How many parts of `contacts` a plan has in their order before it first departs from it.
 
-    Feet that leave or come together do so to within `LASTS`; a foot that scuffs in between is
-    counted, however short.
+    Feet that leave or come together do so to within `LASTS`, unless the stance between is the part
+    that comes next; a foot that scuffs in between is counted, however short.
     """
     legs = {name.split("/")[0] for name in plan.names if name.endswith("/foot/Fz")}
     stands = zip(*((plan[f"{leg}/foot/Fz"] > 0.0)[1:] for leg in legs), strict=True)
     found = [{leg for leg, on in zip(legs, row, strict=True) if on} for row in stands]
     spans = [list(rows) for _, rows in itertools.groupby(range(len(found)), found.__getitem__)]
     order = [found[rows[0]] for rows in spans]
+    asked = [set(part.on) for part in task.contacts]
     kept = order[:1]
     for rows, stance, after in zip(spans[1:], order[1:], [*order[2:], None], strict=True):
         brief = plan.time[rows[-1] + 1] - plan.time[rows[0]] < LASTS
         on_the_way = after is not None and kept[-1] & after <= stance <= kept[-1] | after
-        if stance != kept[-1] and not (brief and on_the_way):
+        is_next = asked[len(kept) : len(kept) + 1] == [stance]
+        if stance != kept[-1] and (is_next or not (brief and on_the_way)):
             kept.append(stance)
-    asked = [set(part.on) for part in task.contacts]
     same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(kept, asked, strict=False))
     return min(sum(1 for _ in same), 2 * len(asked) - len(kept))
 
