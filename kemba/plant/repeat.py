@@ -53,12 +53,8 @@ def counterpart(
     spec, own = load_spec(plant), load_spec(model)
     extra: list[Effect] = [Payload(m=payload)] if payload else []
     if own_effects:
-        named = {e.name: e for e in (*own.effects, *changed_effects(model, changes or {}))}
         theirs = _described(spec)
-        air = {e.name for make in CHAMBERS.values() for e in make()}
-        learnt = {e.name for e in own.effects if e.support is not None}
-        fixed = {e.name for e in theirs if e.name not in learnt} | air
-        mine = [e for e in named.values() if e.moves and e.name not in fixed]
+        mine = _carried(own, [*own.effects, *changed_effects(model, changes or {})], theirs)
         kept = {e.name: e for e in (*theirs, *mine)}
         spec = spec.model_copy(update={"effects": tuple(kept.values())})
     spec = spec.model_copy(update={"robot": own_robot(plant) or own.robot})
@@ -72,11 +68,22 @@ def lacking(model: str, plant: str) -> list[str]:
     return [e.name for e in load_spec(plant).effects if e.name not in known]
 
 
-def carried_over(model: str, payload: float = 0.0) -> list[str]:
+def _carried(own: ModelSpec, effects: Iterable[Effect], theirs: Sequence[Effect]) -> list[Effect]:
+    """Those of the `effects` of a planning model that its plant has too: none of the air, and none
+    that the plant has by itself unless it was learnt."""
+    air = {e.name for make in CHAMBERS.values() for e in make()}
+    learnt = {e.name for e in own.effects if e.support is not None}
+    fixed = {e.name for e in theirs if e.name not in learnt} | air
+    last = {e.name: e for e in effects}
+    return [e for e in last.values() if e.moves and e.name not in fixed]
+
+
+def carried_over(model: str, plant: str = "plant", payload: float = 0.0) -> list[str]:
     """What the plant has because the planning model has it, beyond the shipped one: effects that
     were learnt or added, found lengths, and the task's `payload` [kg]."""
-    plain = {e.name for e in load_spec(PLAIN).effects}
-    added = [e.name for e in load_spec(model).effects if e.moves and e.name not in plain]
+    plain, own = {e.name for e in load_spec(PLAIN).effects}, load_spec(model)
+    carried = _carried(own, own.effects, _described(load_spec(plant)))
+    added = [e.name for e in carried if e.name not in plain]
     return [*added, *([f"payload {payload:g} kg"] if payload else [])]
 
 

@@ -158,7 +158,7 @@ def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     if without:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
-    if alike := carried_over(task.model, task.payload):
+    if alike := carried_over(task.model, task.plant, task.payload):
         names.append(f"the plant has {enumerated(alike)}, too")
     lags = with_lags(found.model) is None and load_spec(task.plant).chambers == "orifice"
     if lags and done.replays and not done.good:

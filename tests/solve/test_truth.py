@@ -115,8 +115,8 @@ def test_what_the_plant_has_of_the_plan_is_said(tmp_path: Path) -> None:
         {"kind": "sensor_bias", "channel": "body/z"},
     ]
     dump_yaml({"base": "planning", "effects": found}, path)
-    assert carried_over(str(path), 0.5) == ["geometry:femur/length", "payload 0.5 kg"]
-    assert carried_over("planning") == []
+    assert carried_over(str(path), payload=0.5) == ["geometry:femur/length", "payload 0.5 kg"]
+    assert carried_over("planning") == carried_over("orifice") == []  # the plant's own air
 
 
 def test_what_was_learnt_replaces_the_plants_own_figure(tmp_path: Path) -> None:
