@@ -40,10 +40,10 @@ def radau(stages: int) -> Scheme:
     """Radau IIA of order 2 stages - 1: the zeros of P_(stages - 1) - P_stages, moved to (0, 1]
     (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.5)."""
     points = (np.sort(legendre.legroots([0.0] * (stages - 1) + [1.0, -1.0])) + 1.0) / 2.0
-    powers = np.arange(stages)
-    integrals = points[:, None] ** (powers + 1) / (powers + 1)
     points[-1] = 1.0
-    return Scheme(points, integrals @ np.linalg.inv(points[:, None] ** powers))
+    powers = np.arange(stages)[:, None]
+    integrals = points ** (powers + 1) / (powers + 1)
+    return Scheme(points, np.linalg.solve(points**powers, integrals).T)
 
 
 RADAU3, RADAU5, RADAU9 = radau(2), radau(3), radau(5)
