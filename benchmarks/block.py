@@ -1,8 +1,10 @@
-"""The part of a page that a benchmark writes."""
+"""The part of a page that a benchmark writes, and the record that it is written from."""
 
 import argparse
+import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 from kemba.files import atomic_text
 from kemba.sweep import machine
@@ -19,6 +21,34 @@ def put_block(page: Path, begin: str, end: str, lines: Iterable[str]) -> None:
     _, after = rest.split(end)
     with atomic_text(page) as stream:
         stream.write("\n".join([before + begin, "", *lines, "", end]) + after)
+
+
+class Record:
+    """The `rows` of a study, a line of JSON each in its file: an interrupted study goes on."""
+
+    def __init__(self, file: Path) -> None:
+        text = file.read_text(encoding="utf-8") if file.is_file() else ""
+        self.file, self.rows = file, [json.loads(line) for line in text.splitlines()]
+
+    def add(self, row: dict[str, Any]) -> None:
+        """Keep a row, in the file at once, and print it."""
+        line = json.dumps(row)
+        print(line, flush=True)
+        self.rows.append(row)
+        with self.file.open("a", encoding="utf-8") as record:
+            record.write(line + "\n")
+
+    def known(self, *keys: str) -> set[tuple[Any, ...]]:
+        """What the rows have under these keys."""
+        return {tuple(row[key] for key in keys) for row in self.rows}
+
+    def show(
+        self, lines: list[str], page: Path | None = None, begin: str = "", end: str = ""
+    ) -> None:
+        """Print the table of the rows, and put it into the `page` where one is given."""
+        print("\n".join(lines))
+        if page is not None:
+            put_block(page, begin, end, lines)
 
 
 def printed(lines: Iterable[str]) -> list[str]:

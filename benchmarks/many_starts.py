@@ -1,4 +1,4 @@
-"""The highest jump and the fastest bound of many starts, beside what energy and torque allow.
+"""The highest jump and the fastest bound of many starts, beside bounds from energy and torque.
 
     python benchmarks/many_starts.py --count 40
     python benchmarks/many_starts.py --save benchmarks/pages/plan-quality.md
@@ -8,17 +8,16 @@ Each is planned and refined; its executions are not part of this.
 """
 
 import argparse
-import json
 import os
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from block import put_block
+from block import Record
 
 from kemba.model import Model, load_model
 from kemba.ocp import load_task
@@ -37,7 +36,7 @@ TASKS: dict[str, tuple[str, list[str], str]] = {  # file, settings, unit of what
 
 
 def bound(what: str, model: Model) -> float:
-    """No motion of this kind does more.
+    """What cannot be exceeded, generously.
 
     The highest: one push from crouched legs, in which the air gives its work at full force, and
     every hip its peak torque as far as it turns. The fastest: a foot that stands is passed at the
@@ -67,7 +66,7 @@ def planned(job: tuple[str, int, float]) -> dict[str, Any]:
 
 def page(rows: Iterable[dict[str, Any]]) -> list[str]:
     """The table: a line for the highest jump and one for the fastest bound."""
-    lines = ["| motion | starts | refined | best | median of these | no motion does more |",
+    lines = ["| motion | starts | refined | best | median of these | bound |",
              "|---|---:|---:|---:|---:|---:|"]  # fmt: skip
     model = load_model("planning")
     for what, (file, _, unit) in TASKS.items():
@@ -88,21 +87,14 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--save", type=Path, help="page whose table is replaced")
     asked = parser.parse_args()
-    text = RECORD.read_text() if RECORD.is_file() else ""
-    rows = [json.loads(line) for line in text.splitlines()]
-    have = {(row["what"], row["seed"]) for row in rows}
+    record = Record(RECORD)
+    have = record.known("what", "seed")
     jobs = [(what, seed, asked.limit) for seed in range(asked.count) for what in TASKS]
-    jobs = [job for job in jobs if job[:2] not in have]
     with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
-        for row in pool.map(planned, jobs):
-            rows.append(row)
-            print(json.dumps(row), flush=True)
-            with RECORD.open("a") as record:
-                record.write(json.dumps(row) + "\n")
-    lines = page(rows)
-    print("\n".join(lines))
-    if asked.save is not None:
-        put_block(asked.save, BEGIN, END, lines)
+        left = [pool.submit(planned, job) for job in jobs if job[:2] not in have]
+        for done in as_completed(left):
+            record.add(done.result())
+    record.show(page(record.rows), asked.save, BEGIN, END)
 
 
 if __name__ == "__main__":

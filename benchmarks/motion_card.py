@@ -11,31 +11,21 @@ on the simulated robot keep to it. A draw that is proved impossible is told apar
 """
 
 import argparse
-import json
 import os
 import random
 import tempfile
-import time
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from block import put_block
+from block import Record
+from motions import answered, shipped
 
-from kemba.config import dump_yaml, shipped_configs
-from kemba.config.reader import read
-from kemba.errors import KembaError
-from kemba.ocp import load_task
-from kemba.solve import Approach, Listener, best_plan
+from kemba.config import dump_yaml
 
 RECORD = Path(__file__).with_name("motion_card.jsonl")
 BEGIN, END = "<!-- written by benchmarks/motion_card.py -->", "<!-- end of motion card -->"
-
-
-def shipped(folder: str, name: str) -> dict[str, Any]:
-    """A shipped YAML file as data."""
-    return dict(read(shipped_configs(folder)[f"{name}.yaml"].read_text()).data)
 
 
 def platform(rng: random.Random) -> tuple[dict[str, Any], str]:
@@ -104,23 +94,6 @@ def drawn(kind: str, seed: int, number: int, folder: Path) -> tuple[Path, str]:
     return file, f"{words}; {figures}"
 
 
-def answered(file: Path, limit: float) -> dict[str, Any]:
-    """What `solve` makes of a task's file."""
-    began = time.process_time()
-    try:
-        task, document = load_task(str(file), [f"solver.time_limit={limit} s"])
-        best = best_plan(task, document, Approach(), Listener())
-    except KembaError as error:
-        return {"refused": str(error), "cpu": time.process_time() - began}
-    verdicts = best.judged.verdicts if best.judged else {}
-    return {
-        "planned": bool(best.plan.status.plan), "refined": best.plan.refined,
-        "replays": "replay" in verdicts and verdicts["replay"].good,
-        "good": best.good, "sentence": best.result["sentence"],
-        "cpu": time.process_time() - began,
-    }  # fmt: skip
-
-
 def page(rows: list[dict[str, Any]]) -> list[str]:
     """The table, a line for each kind."""
     lines = ["| kind | drawn | refused | a plan on nodes | refined | its replay keeps to it | good "
@@ -128,7 +101,7 @@ def page(rows: list[dict[str, Any]]) -> list[str]:
     for kind in KINDS:
         own = [row for row in rows if row["kind"] == kind]
         told = [f"{sum(bool(row.get(key)) for row in own)}"
-                for key in ("refused", "planned", "refined", "replays", "good")]  # fmt: skip
+                for key in ("refused", "planned", "refined", "replay", "good")]  # fmt: skip
         seconds = sorted(row["cpu"] for row in own)
         middle = f"{seconds[len(seconds) // 2]:.0f}" if seconds else ""
         lines.append(f"| {' | '.join([kind, str(len(own)), *told, middle])} |")
@@ -143,25 +116,16 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=300.0, help="s of wall clock of a task")
     parser.add_argument("--save", type=Path, help="page whose table is replaced")
     asked = parser.parse_args()
-    rows = (
-        [json.loads(line) for line in RECORD.read_text().splitlines()] if RECORD.is_file() else []
-    )
-    have = {(row["kind"], row["seed"], row["number"]) for row in rows}
+    record = Record(RECORD)
+    have = record.known("kind", "seed", "number")
     for number in range(asked.count):
-        for kind in KINDS:
-            if (kind, asked.seed, number) in have:
-                continue
+        for kind in (kind for kind in KINDS if (kind, asked.seed, number) not in have):
             with tempfile.TemporaryDirectory() as folder:
                 file, words = drawn(kind, asked.seed, number, Path(folder))
-                row = {"kind": kind, "seed": asked.seed, "number": number, "asks": words,
-                       "limit": asked.limit, **answered(file, asked.limit)}  # fmt: skip
-            rows.append(row)
-            print(json.dumps(row), flush=True)
-            with RECORD.open("a") as record:
-                record.write(json.dumps(row) + "\n")
-    print("\n".join(lines := page(rows)))
-    if asked.save is not None:
-        put_block(asked.save, BEGIN, END, lines)
+                found = answered(file, asked.limit)
+            asks = {"kind": kind, "seed": asked.seed, "number": number, "asks": words}
+            record.add({**asks, "limit": asked.limit, **found})
+    record.show(page(record.rows), asked.save, BEGIN, END)
 
 
 if __name__ == "__main__":

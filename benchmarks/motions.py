@@ -10,7 +10,6 @@ guess, as `solve` plans it, without memory, within `--limit` seconds of the wall
 """
 
 import argparse
-import json
 import os
 import tempfile
 import time
@@ -20,7 +19,7 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from block import put_block
+from block import Record
 
 from kemba.config import dump_yaml, shipped_configs
 from kemba.config.reader import read
@@ -155,25 +154,17 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=300.0, help="s of a motion")
     parser.add_argument("--save", type=Path, help="page whose table is replaced")
     asked = parser.parse_args()
-    text = RECORD.read_text() if RECORD.is_file() else ""
-    rows = [json.loads(line) for line in text.splitlines()]
-    have = {(row["robot"], row["motion"]) for row in rows}
+    record = Record(RECORD)
+    have = record.known("robot", "motion")
     wanted = [(robot, motion) for robot in asked.robot for motion in asked.motion]
     for robot, motion in wanted if asked.save is None else ():
         if (robot, motion) in have:
             continue
         with tempfile.TemporaryDirectory() as folder:
             file = written(motion, robot, Path(folder))
-            row = {"robot": robot, "motion": motion, "limit": asked.limit,
-                   **answered(file, asked.limit)}  # fmt: skip
-        rows.append(row)
-        print(json.dumps(row), flush=True)
-        with RECORD.open("a") as record:
-            record.write(json.dumps(row) + "\n")
-    lines = page(rows, motions)
-    print("\n".join(lines))
-    if asked.save is not None:
-        put_block(asked.save, BEGIN, END, lines)
+            found = answered(file, asked.limit)
+        record.add({"robot": robot, "motion": motion, "limit": asked.limit, **found})
+    record.show(page(record.rows, motions), asked.save, BEGIN, END)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from block import put_block
+from block import Record
 
 BEGIN, END = "<!-- written by benchmarks/nosbench.py -->", "<!-- end of nosbench -->"
 FEASIBLE, DEARER = 1e-6, 1e-4
@@ -210,9 +210,8 @@ def main() -> None:
     parser.add_argument("--results", type=Path, required=True, help="a line of JSON for each solve")
     parser.add_argument("--save", type=Path, help="page whose tables are replaced")
     asked = parser.parse_args()
-    kept = asked.results.read_text().splitlines() if asked.results.is_file() else []
-    rows = [json.loads(line) for line in kept]
-    have = {(row["file"], row["method"]) for row in rows}
+    record = Record(asked.results)
+    have = record.known("file", "method")
     there = len(list(asked.folder.glob("*.json"))) if asked.folder else 0
     files = []
     if asked.folder is not None:
@@ -223,16 +222,10 @@ def main() -> None:
         for method in asked.methods:
             if (path.name, method) in have:
                 continue
-            row = {"file": path.name, "large": large, "tuned": asked.tuned, "method": method,
-                   "seed": asked.seed, "there": there, "limit": asked.limit,
-                   **tried(path, method, asked.limit)}  # fmt: skip
-            rows.append(row)
-            with asked.results.open("a") as file:
-                file.write(json.dumps(row) + "\n")
-    lines = page(rows)
-    print("\n".join(lines))
-    if asked.save is not None:
-        put_block(asked.save, BEGIN, END, lines)
+            asks = {"file": path.name, "large": large, "tuned": asked.tuned, "method": method}
+            how = {"seed": asked.seed, "there": there, "limit": asked.limit}
+            record.add({**asks, **how, **tried(path, method, asked.limit)})
+    record.show(page(record.rows), asked.save, BEGIN, END)
 
 
 if __name__ == "__main__":

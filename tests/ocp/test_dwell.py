@@ -40,3 +40,7 @@ def test_the_shortest_pulse_goes_first() -> None:
 
 def test_values_between_are_rounded_first() -> None:
     assert np.array_equal(dwelling(0.2 + 0.6 * pulse(6, 5), H, LEAST), pulse(6, 5))
+
+
+def test_what_is_no_number_comes_to_an_end() -> None:
+    assert np.isnan(dwelling(np.full(21, np.nan), H, LEAST)).any()

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import casadi as ca
+import numpy as np
 import pytest
 
 from kemba.ocp import Plan, load_task
@@ -13,7 +14,8 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement import order_of
-from kemba.ocp.transcription.transcribe import Parameters
+from kemba.ocp.transcription.symmetry import whole
+from kemba.ocp.transcription.transcribe import Parameters, Transcription
 
 TURN = ("cost.calm.expression=body/pitch_rate^2", "cost.calm.weight=2")
 
@@ -71,3 +73,12 @@ def test_half_a_robot_knows_costs_of_what_is_zero_by_symmetry() -> None:
         at = planner.guess(half).Y.ravel(), Parameters(1e-3).vector(half.nodes)
         values.append(float(objective(*at)))
     assert values[0] == pytest.approx(values[1])
+
+
+def test_what_is_only_to_be_as_large_as_possible_moves_no_guess() -> None:
+    """A speed at the start without limits gave a guess that was no number, and no end."""
+    fastest = "goals.stride={quantity: body/vx, at: start, maximise: true}"
+    planner = Planning.of(*load_task("bound.yaml", [fastest])).planner
+    known = planner.model, planner.task, planner.requirements
+    program = Transcription(*known, whole(planner.model.node), 40)
+    assert np.isfinite(planner.guess(program).Y).all()

@@ -13,6 +13,7 @@ from kemba.ocp.phases.modes import read_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3
 from kemba.ocp.refinement.refine import Refiner, reduction_of
+from kemba.ocp.task.requirement import Requirement, quantities
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.unilateral import read_constraints
@@ -78,3 +79,20 @@ def test_the_motion_lasts_what_the_task_allows() -> None:
     program, _ = built()
     (row,) = (r for r in program.rows if r.label == "duration")
     assert (row.lower, row.upper) == pytest.approx((0.8, 1.2))
+
+
+@pytest.mark.parametrize("moment", [0.0, 0.5, 1.0])
+def test_what_is_to_be_as_large_as_possible_may_be_so_at_any_moment(moment: float) -> None:
+    """At the first node there are neither inputs nor forces to read."""
+    run = solved("jump")
+    fast = Requirement(
+        ("goals", "fast"), quantities(run.model)["body/vx"], moment, -np.inf, np.inf, aim=1
+    )
+    half = reduction_of(run.model, run.task, [fast], run.plan)
+    refiner = Refiner(run.model, run.task, [fast], run.plan, half, Control())
+    program, x = refiner.build(refiner.phases(), run.plan, RADAU3)
+    assert x.size == program.problem.hess_lag.size1_out(0)
+    slope = np.array(program.problem.grad_f(x, [])[1]).ravel()
+    at = program.columns.end(round(moment * program.nodes))["v"]
+    names = [q.name for q in run.model.mechanism.velocities]
+    assert [names[i] for i in np.flatnonzero(slope[at] < 0.0)] == ["body/vx"]

@@ -22,7 +22,6 @@ from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -149,9 +148,7 @@ class Continuation:
         kept = on_elements(program, mesh.stages) if mesh.stages is not None else None
         x = with_impacts(program, x, Continuing.ease) if kept is None else kept
         if self.origin.finer and kept is not None:
-            program, x = refiner.carried(RADAU9, program, x)
-        elif self.task.scene.cornered:
-            add_missed(program, x, Refining.near_rows)
+            program, x = refiner.build(mesh.phases, (program, x), RADAU9)
         if self.origin.ticks:
             on_ticks(program, x)
         begin = Iterate(x)

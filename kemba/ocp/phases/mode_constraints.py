@@ -287,8 +287,9 @@ def add_requirements(
             continue
         seen.add(key)
         if requirement.aim:
-            at = _columns(program, requirement.node(program.nodes), full=True)
-            program.add_cost(z, aim_cost(requirement, g), at)
+            own, full = _variables(view, g)
+            at = _columns(program, requirement.node(program.nodes), full)
+            program.add_cost(own, aim_cost(requirement, g), at)
         last = program.nodes
         nodes = requirement.nodes(last)
         fixed = requirement.at is not None and requirement.lower == requirement.upper
@@ -310,9 +311,8 @@ def _between_moments(
         return
     before = ca.SX.sym("before", z.numel())
     g = later - ca.substitute(earlier, z, before)
-    full = any(ca.depends_on(part, view.z("u lam")) for part in (later, earlier))
-    state = view.z("q v s u lam" if full else "q v s").numel()
-    both = ca.vertcat(before[:state], z[:state])
+    own, full = _variables(view, later, earlier)
+    both = ca.vertcat(before[: own.numel()], own)
     nodes = requirement.minus.node(program.nodes), requirement.node(program.nodes)
     at = np.concatenate([_columns(program, node, full) for node in nodes])
     scale = requirement.scale
@@ -345,10 +345,16 @@ def _put(
         return
     scale, label = requirement.scale, requirement.label
     low, high = requirement.lower / scale, requirement.upper / scale
-    full = ca.depends_on(g, view.z("u lam"))
+    z, full = _variables(view, g)
     columns = [_columns(program, node, full) for node in nodes]
-    z = view.z("q v s u lam" if full else "q v s")
     program.add(label, z, g / scale, low, high, columns)
+
+
+def _variables(view: View, *expressions: ca.SX) -> tuple[ca.SX, bool]:
+    """The symbols of a node that expressions are about, and whether inputs and forces are among
+    them, which act on the interval before the node: at the first there is none."""
+    full = any(ca.depends_on(g, view.z("u lam")) for g in expressions)
+    return view.z("q v s u lam" if full else "q v s"), full
 
 
 def _columns(program: PhaseProgram, node: int, full: bool) -> np.ndarray:

@@ -271,21 +271,9 @@ class Refiner:
         self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
     ) -> tuple[tuple[PhaseProgram, Iterate], Refined]:
         """The exact program with a scheme, solved from a solution `x` (size,) of another one."""
-        program, start = self.carried(scheme, other, x)
+        program, start = self.build(other.phases, (other, x), scheme)
         found = self._solve(program, start, warm(Refining.rough_iterations))
         return (program, found), read(program, found)
-
-    def carried(
-        self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
-    ) -> tuple[PhaseProgram, np.ndarray]:
-        """The exact program with a scheme and its start (size,), from a solution of another: with
-        rows between nodes where that is near to what it keeps off, where there are corners to be
-        cut, or most stages, which begin at an exact solution."""
-        program, _ = self.build(other.phases, self.plan, scheme)
-        start = carried(program, other.columns, other.scheme.points, x)
-        if scheme is RADAU9 or self.task.scene.cornered:
-            add_missed(program, start, Refining.near_rows)
-        return program, start
 
     def _keeps(self, found: Refined) -> bool:
         """Whether a plan keeps to all that its certificate measures."""
@@ -294,9 +282,9 @@ class Refiner:
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
     ) -> tuple[PhaseProgram, np.ndarray]:
-        """The program of some phases and its start (size,), scaled; with rows between nodes near
-        corners, so that a start on few nodes does not cut them. Raises ValueError for a model to
-        which the method does not apply."""
+        """The program of some phases and its start (size,), scaled; with rows between nodes where
+        that is near to what it keeps off, if there are corners to be cut, or most stages. Raises
+        ValueError for a model to which the method does not apply."""
         constraints = read_constraints(self.model, self.reduction)
         program = PhaseProgram(
             self.model, self.task, self.reduction, phases, constraints, scheme, elastic
@@ -312,7 +300,7 @@ class Refiner:
         add_requirements(program, self.requirements, at_first, at_last)
         add_mode_constraints(program, at_first)
         x = np.concatenate([x, np.zeros(program.columns.size - len(x))])
-        if self.task.scene.cornered and (elastic > 0.0 or scheme is RADAU3):
+        if self.task.scene.cornered or scheme is RADAU9:
             add_missed(program, x, Refining.near_rows)
         return program, np.clip(x, program.lower, program.upper)
 

@@ -73,11 +73,16 @@ class HeightCourse:
 
 
 def asked(requirements: Sequence[Requirement], name: str, at: float) -> float | None:
-    """The value required of a quantity at a moment, or None; of a range its lower end, if any."""
-    for requirement in (r for r in requirements if r.minus is None):
-        if requirement.quantity.name == name and requirement.at == at:
-            return requirement.lower if np.isfinite(requirement.lower) else requirement.upper
-    return None
+    """The value required of a quantity at a moment, or None where it has no limits."""
+    there = (
+        _limit(r) for r in requirements if (r.quantity.name, r.at, r.minus) == (name, at, None)
+    )
+    return next((limit for limit in there if limit is not None), None)
+
+
+def _limit(r: Requirement) -> float | None:
+    """The lower limit of a requirement, else the upper one; None of what is only to be large."""
+    return next(filter(np.isfinite, (r.lower, r.upper)), None)
 
 
 def jump(
@@ -223,8 +228,8 @@ def _ahead(
     lasts = parts[-1][1]
     knots = {w.at: 0.0 for w in requirements if w.location[-1] == "rest" and w.at is not None}
     for w in requirements:
-        value = w.lower if np.isfinite(w.lower) else w.upper
-        if w.at is None or w.location[-1] == "rest":
+        value = _limit(w)
+        if w.at is None or value is None or w.location[-1] == "rest":
             continue
         if w.quantity.name == "body/vx":
             knots[w.at] = value
