@@ -6,6 +6,8 @@ import numpy as np
 
 from kemba.ocp.phases.modes import HELD, OPEN, Phase, _fill_hops, _settling
 from kemba.ocp.phases.settings import Reading
+from kemba.ocp.reading import asked_of, load_task
+from kemba.ocp.refinement.refine import stands
 
 FALLS = Phase(84, 97, (HELD, OPEN), (1.0, 0.0))
 HITS = Phase(97, 98, (HELD, HELD), (1.0, 0.0))
@@ -37,3 +39,14 @@ def test_only_brief_and_small_hops_are_filled() -> None:
         modes = np.array(touches)
         _fill_hops(modes, gap, hop)
         assert np.flatnonzero(modes != np.array(touches)).tolist() == filled
+
+
+def test_where_the_task_says_which_feet_stand_that_is_read() -> None:
+    task, document = load_task("brake")  # air, rear, air, front, both; the rest of its nodes
+    model, _ = asked_of(task, document)
+    standing = stands(model, task, 101)
+    borders = {name: np.flatnonzero(np.diff(on.astype(int))).tolist()
+               for name, on in standing.items()}  # fmt: skip
+    assert borders == {"front/contact:gap": [35], "rear/contact:gap": [10, 25, 55]}
+    assert not any(on[0] for on in standing.values())
+    assert stands(model, task.model_copy(update={"contacts": ()}), 101) == {}

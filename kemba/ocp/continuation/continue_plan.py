@@ -9,7 +9,7 @@ import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -28,6 +28,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5, RADAU9
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
+from kemba.ocp.refinement.proximal import proximal_points
 from kemba.ocp.refinement.refine import Refined, Refiner, read, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.start import on_elements, solve_along, warm
 from kemba.ocp.relaxation.session import Attempt
@@ -156,13 +157,27 @@ class Continuation:
             begin = mesh.stages.iterate(program, x)
         options = warm(min(Continuing.iterations, self.task.solver.max_iterations))
         mu = ipopt.last_barrier(Refining.tol)
+        known: dict[str, Any] = {}
         if begin.lam_g is not None:
             # a multiplier is at least that of a bound at distance 1
-            options |= ipopt.warm(mu, Continuing.push, warm_start_mult_bound_push=mu)
+            known = ipopt.warm(mu, Continuing.push, warm_start_mult_bound_push=mu)
         elif kept is not None:
-            options |= ipopt.central(mu, Refining.push)
+            known = ipopt.central(mu, Refining.push)
         stagnation = Stagnation(Continuing.patience, Continuing.underway, Refining.slow)
-        found = solve_along(program, begin, options, self.control, stagnation)
+        found = solve_along(program, begin, options | known, self.control, stagnation)
+
+        def make(near: PhaseProgram, x: np.ndarray) -> tuple[PhaseProgram, np.ndarray]:
+            new, x = refiner.build(mesh.phases, (near, x), near.scheme)
+            if self.origin.ticks:
+                on_ticks(new, x)
+            return new, x
+
+        def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
+            return solve_along(program, Iterate(x), options, self.control, stagnation)
+
+        if not found.solved and (self.origin.ticks or self.origin.finer):  # it changes little
+            self.tell(f"from {self.origin.name}: by steps that stay near it")
+            program, found = proximal_points(make, solve, program, x) or (program, found)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)

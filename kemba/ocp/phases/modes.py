@@ -49,15 +49,19 @@ def read_phases(
     marks: Sequence[int],
     trim: bool = False,
     brief: float = 0.0,
+    asked: Mapping[str, np.ndarray] | None = None,
 ) -> list[Phase]:
     """Phases of a plan with `valves` (rows, n); a phase ends at every node of `marks` too.
 
     `trim`: a foot that slides under little load has left the ground. A foot that touches for less
-    than `brief` [s] on its way through the air does not touch.
+    than `brief` [s] on its way through the air does not touch. `asked`: whether a foot stands, by
+    the label of its contact (rows,), where the task says it; what its force says is then left.
     """
-    modes = np.column_stack([_modes(model, c, plan, trim) for c in constraints])
-    for i in (i for i, c in enumerate(constraints) if c.friction is not None):
-        drop_grazes(modes[:, i], plan.time, brief)
+    asked = asked or {}
+    modes = np.column_stack([_modes(model, c, plan, trim, asked.get(c.label)) for c in constraints])
+    for i, c in enumerate(constraints):
+        if c.friction is not None and c.label not in asked:
+            drop_grazes(modes[:, i], plan.time, brief)
     _valves_first(modes, valves)
     same = (modes[1:] == modes[:-1]).all(axis=1) & (valves[1:] == valves[:-1]).all(axis=1)
     borders = sorted({0, len(plan) - 1, *(np.flatnonzero(~same[1:]) + 1).tolist(), *marks})
@@ -84,8 +88,14 @@ def _settling(phases: Sequence[Phase]) -> list[Phase]:
     return [hit, last]
 
 
-def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -> np.ndarray:
-    """Mode of a constraint at every row (rows,)."""
+def _modes(
+    model: Model,
+    constraint: Constraint,
+    plan: Trajectory,
+    trim: bool,
+    asked: np.ndarray | None,
+) -> np.ndarray:
+    """Mode of a constraint at every row (rows,); `asked`: where it is closed, if the task says."""
     x, node, reading = arrays(model, plan), model.node, Reading
     names = [constraint.gap]
     if constraint.friction is not None:
@@ -93,6 +103,9 @@ def _modes(model: Model, constraint: Constraint, plan: Trajectory, trim: bool) -
     evaluate = ca.Function("at", [node.q, node.v], names)
     found = _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))
     values = [np.array(value).ravel() for value in found]
+    if asked is not None and constraint.friction is not None:
+        slides = np.abs(values[1]) > reading.slides
+        return np.where(asked, np.where(slides, np.where(values[1] > 0, AHEAD, BACK), HELD), OPEN)
     force = x["lam"][:, constraint.force] / model.mechanism.weight
     modes = np.where(force * reading.stiff > np.maximum(values[0], 0.0), HELD, OPEN)
     if values[0][0] < reading.closed and modes[1] == OPEN:

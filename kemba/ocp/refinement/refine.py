@@ -25,6 +25,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, RADAU9, STATE, Scheme
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
+from kemba.ocp.refinement.proximal import Solution, proximal_points
 from kemba.ocp.refinement.repair import misfits, repaired, simplified, with_pulses
 from kemba.ocp.refinement.start import (
     carried,
@@ -36,6 +37,7 @@ from kemba.ocp.refinement.start import (
     to_trajectory,
     warm,
 )
+from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays
@@ -161,7 +163,10 @@ class Refiner:
         inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
         valves = np.round(inputs[:, valve_columns(self.model, self.reduction)])
         brief = LASTS if self.task.clearance else 0.0
-        return read_phases(self.model, constraints, self.plan, valves, self.marks, trim, brief)
+        asked = stands(self.model, self.task, len(self.plan))
+        return read_phases(
+            self.model, constraints, self.plan, valves, self.marks, trim, brief, asked
+        )
 
     def improved(self, found: Refined) -> Refined:
         """A solved plan with the pulses of valves that lower its cost."""
@@ -267,13 +272,22 @@ class Refiner:
             self.solution = solution
         return made
 
-    def _by(
-        self, scheme: Scheme, other: PhaseProgram, x: np.ndarray
-    ) -> tuple[tuple[PhaseProgram, Iterate], Refined]:
-        """The exact program with a scheme, solved from a solution `x` (size,) of another one."""
-        program, start = self.build(other.phases, (other, x), scheme)
-        found = self._solve(program, start, warm(Refining.rough_iterations))
-        return (program, found), read(program, found)
+    def _by(self, scheme: Scheme, other: PhaseProgram, x: np.ndarray) -> tuple[Solution, Refined]:
+        """The exact program with a scheme, solved from a solution `x` (size,) of another one; where
+        that fails, by proximal points."""
+
+        def make(near: PhaseProgram, x: np.ndarray) -> tuple[PhaseProgram, np.ndarray]:
+            return self.build(other.phases, (near, x), scheme)
+
+        def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
+            return self._solve(program, x, warm(Refining.rough_iterations))
+
+        program, start = make(other, x)
+        solution = program, solve(program, start)
+        if not solution[1].solved:
+            self.tell("phases: by steps that stay near the last plan")
+            solution = proximal_points(make, solve, other, x) or solution
+        return solution, read(*solution)
 
     def _keeps(self, found: Refined) -> bool:
         """Whether a plan keeps to all that its certificate measures."""
@@ -326,6 +340,20 @@ def read(program: PhaseProgram, last: Iterate) -> Refined:
     trajectory = to_trajectory(program, last.Y)
     measured, own = certificate(program, last.Y, trajectory), Stages.of(program, last)
     return replace(found, trajectory=trajectory, certificate=measured, stages=own)
+
+
+def stands(model: Model, task: Task, rows: int) -> dict[str, np.ndarray]:
+    """Whether a foot stands at each of the `rows` (rows,), by the label of its contact, as the
+    task's `contacts` say; empty where it says nothing."""
+    if not task.contacts:
+        return {}
+    at = np.arange(rows) / (rows - 1)
+    found = {leg: np.zeros(rows, dtype=bool) for leg in model.mechanism.legs}
+    for part, (begin, end) in zip(task.contacts, spans(task.contacts), strict=True):
+        inside = (at > begin + 1e-9) & (at <= end + 1e-9) | ((at == 0.0) & (begin == 0.0))
+        for leg in part.on:
+            found[leg] |= inside
+    return {f"{leg}/contact:gap": on for leg, on in found.items()}
 
 
 def order_of(

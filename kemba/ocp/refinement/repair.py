@@ -16,11 +16,13 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
+from kemba.events import runs
 from kemba.ocp.nlp.ending import Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.settings import Elements, Refining
+from kemba.ocp.refinement.proximal import Solution
 from kemba.ocp.refinement.start import carried, solve_along, warm
 from kemba.ocp.transcription.layout import STEP
 
@@ -66,9 +68,10 @@ def repaired(
     worst = max((misfit.size for misfit in found), default=0.0)
     for misfit in (m for m in found if m.size > FAR * worst):
         e, i = misfit.element, misfit.constraint
-        own = before[:, i]
+        own, new = before[:, i], modes[:, i].copy()
         if misfit.kind not in ("touch", "rate", "approach"):
-            modes[e, i] = _other(own, misfit)
+            new[e] = _other(own, misfit)
+            _change(program, modes, i, new)
             continue
         first = e
         while first > 0 and own[first - 1] != OPEN:
@@ -78,7 +81,8 @@ def repaired(
         begun.add((i, first))
         phase = program.phases[program.columns.phase_of[e]]
         last = phase.last if e == first else e + 1
-        modes[e:last, i] = OPEN
+        new[e:last] = OPEN
+        _change(program, modes, i, new)
     phases = [
         replace(p, first=e, last=e + 1, modes=tuple(int(m) for m in modes[e]))
         for p in program.phases
@@ -86,6 +90,14 @@ def repaired(
     ]
     new = merged(phases, marks)
     return None if new == merged(program.phases, marks) else new
+
+
+def _change(program: PhaseProgram, modes: np.ndarray, i: int, new: np.ndarray) -> None:
+    """Give constraint `i` its `new` modes (elements,), unless the task says which feet stand, and
+    this one would stand more or less often."""
+    foot = program.task.contacts and program.constraints[i].friction is not None
+    if not foot or len(runs(new != OPEN)) == len(runs(modes[:, i] != OPEN)):
+        modes[:, i] = new
 
 
 def _other(modes: np.ndarray, misfit: Misfit) -> int:
@@ -141,8 +153,6 @@ def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
 
     return min(sides, key=distance).modes
 
-
-Solution = tuple[PhaseProgram, Iterate]
 
 PAYS = 0.02  # of the cost: a smaller gain is within what starts differ by
 FAILS = 2  # pulses without a cheaper plan, after which no other is tried
