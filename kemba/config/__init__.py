@@ -19,6 +19,7 @@ from kemba.config.parsing import (
     refused,
     shipped_configs,
     shipped_folder,
+    with_added,
 )
 
 __all__ = [
@@ -37,5 +38,6 @@ __all__ = [
     "refused",
     "shipped_configs",
     "shipped_folder",
+    "with_added",
     "written",
 ]

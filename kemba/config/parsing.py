@@ -54,9 +54,17 @@ def apply_overrides(document: Document, options: Iterable[str]) -> Document:
     return dataclasses.replace(document, data=data, overrides=overrides)
 
 
+def with_added(name: str) -> tuple[str, str] | None:
+    """A and B of a name `A+B`, the file A with what the file B adds; None for any other name."""
+    first, plus, added = name.rpartition("+")
+    return (first, added) if plus and not is_file(Path(name)) else None
+
+
 def beside(name: str, folder: Path) -> str:
     """The whole path of the file `name` in `folder` or else in the current folder; where there is
-    neither, `name` as given, which may be that of a shipped file."""
+    neither, `name` as given, which may be that of a shipped file. Of `A+B` both are looked for."""
+    if (parts := with_added(name)) is not None and not is_file(folder / name):
+        return "+".join(beside(part, folder) for part in parts)
     near = (path for path in (folder / name, Path(name)) if is_file(path))
     found = next(near, None)
     return name if found is None else str(found.resolve())

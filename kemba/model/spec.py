@@ -11,7 +11,16 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from kemba.config import Document, Section, find_config, is_file, load_yaml, parse, shipped_configs
+from kemba.config import (
+    Document,
+    Section,
+    find_config,
+    is_file,
+    load_yaml,
+    parse,
+    shipped_configs,
+    with_added,
+)
 from kemba.effects import AnyEffect, Effect
 from kemba.effects.catalogue import CHAMBERS
 from kemba.effects.pneumatics.flow import ATMOSPHERE
@@ -139,7 +148,12 @@ def evidence_folder(name: str | Path) -> Path:
 
 def model_chain(name: str | Path) -> list[tuple[Path, ModelSpec]]:
     """Files and specs of the model YAML `name`, its base, the base of that, ...; every `robot` is
-    a whole path. Raises KembaError with every mistake of a file, and where bases form a circle."""
+    a whole path. `A+B` is the model A with what the file B itself adds: A is the base of B there.
+    Raises KembaError with every mistake of a file, and where bases form a circle."""
+    if (parts := with_added(str(name))) is not None:
+        under, ((path, spec), *_) = (model_chain(part) for part in parts)
+        joined = f"{under[0][1].name}+{spec.name}"
+        return [(path, spec.model_copy(update={"base": parts[0], "name": joined})), *under]
     chain: list[tuple[Path, ModelSpec]] = []
     path = find_config(str(name), "models").resolve()
     while True:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kemba.config import Document, apply_overrides, beside, find_config, load_yaml
+from kemba.config import Document, apply_overrides, beside, find_config, load_yaml, with_added
 from kemba.config.parsing import sound
 from kemba.effects.mechanics.load import Payload
 from kemba.errors import ConfigErrors, KembaError, listed_errors
@@ -98,7 +98,8 @@ def look_up(task: Task, document: Document) -> None:
     """Raise KembaError, at the line of the task, where it names a model that there is not."""
     for key, name in (("model", task.model), ("plant", task.plant)):
         try:
-            find_config(name, "models")
+            for part in with_added(name) or (name,):
+                find_config(part, "models")
         except KembaError as error:
             what = f"{key}: {name}: {error.what}"
             raise document.error((key,), what, error.expected, error.hint) from None

@@ -52,8 +52,10 @@ def solve_into(
     try:
         best = best_plan(task, document, approach, listener, str(folder.path))
         found, result = best.plan, best.result
-        if found.task != task and not task.sequence:
-            dump_yaml(found.task.model_dump(exclude_none=True, by_alias=True), folder / "task.yaml")
+        same = task.model_copy(update={"model": found.task.model})  # a sequence stays one
+        kept = same if task.sequence else found.task
+        if kept != task:
+            dump_yaml(kept.model_dump(exclude_none=True, by_alias=True), folder / "task.yaml")
         if figure:
             listener.tell("drawing")
         _keep(found, result, best.motions, folder, figure)

@@ -5,17 +5,20 @@ for each start:                     an earlier plan, one guess after the other
     for each repair:                nothing, more stages an element, edges on ticks
         execute and judge           kemba.solve.trial
     stop if the best trial is good
+    from here on with physical chambers, if only the simulated robot misses, which has them
 give the trial of the best score; where the plant keeps to none, the best that it keeps to with
 feedback                            kemba.solve.feedback
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from kemba.config import Document
+from kemba.errors import KembaError
+from kemba.model import load_spec
 from kemba.ocp import Plan, Task
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
@@ -23,6 +26,8 @@ from kemba.ocp.finer import dear
 from kemba.ocp.nlp.ipopt import Watch
 from kemba.ocp.planned import answer
 from kemba.ocp.planning import Planning, plan_best, spent
+from kemba.plant.certificate import PLANT
+from kemba.plant.repeat import PLAIN
 from kemba.scenarios.share import Share
 from kemba.solve.trial import Trial, TrialOrder, executed
 from kemba.stopwatch import Tell, silent
@@ -132,9 +137,9 @@ def best_plan(
     execution = TrialOrder(approach.replay, listener.tell, place)
     planning = _planning(task, document, approach, listener, deadline)
     tried: list[Trial] = []
-    for one in _candidates(planning, approach, listener, deadline):
+    for current, one in _candidates(planning, tried, approach, listener, deadline):
         first = executed(one.plan, execution, one.table, one.share)
-        trials = repaired(first, planning, execution) if approach.replay else iter((first,))
+        trials = repaired(first, current, execution) if approach.replay else iter((first,))
         tried.extend(trials)
         best = max(tried, key=lambda trial: trial.score)
         if best.good:
@@ -154,6 +159,8 @@ def best_plan(
         model = planning.planner.model
         best.result["best_known"] = best_known(planning.planner.task, model, listener.tell)
     best = best if best is last else _with_all(best, last)
+    if (air := best.plan.task.model) != task.model:
+        best.result["sentence"] += f"; {WITH_AIR.format(load_spec(air).name)}"
     best.result["trials"] = [str(trial) for trial in tried]
     return best
 
@@ -175,24 +182,53 @@ def _planning(
 
 
 def _candidates(
-    planning: Planning, approach: Approach, listener: Listener, deadline: float
-) -> Iterator[PlanCandidate]:
-    """Plans of a task, made when asked for."""
+    planning: Planning,
+    tried: Sequence[Trial],
+    approach: Approach,
+    listener: Listener,
+    deadline: float,
+) -> Iterator[tuple[Planning, PlanCandidate]]:
+    """Plans of a task with the planning that made them, when asked for; `tried`: those executed."""
     task, document = planning.planner.task, planning.document
     origin = approach.origin
     if approach.replay and task.robust > 0:
-        yield _most_robust(task, document, approach, listener, deadline)
+        yield planning, _most_robust(task, document, approach, listener, deadline)
         return
     if approach.starts > 1:
         told = approach.log, listener.tell, deadline
-        yield PlanCandidate(plan_best(task, document, approach.starts, approach.jobs, *told))
+        best = plan_best(task, document, approach.starts, approach.jobs, *told)
+        yield planning, PlanCandidate(best)
         return
     if approach.free and approach.memory:
         from kemba.solve.memory import recalled
 
         origin = recalled(task, planning.planner.model, listener.tell)
     for found in planning.plans(origin):
-        yield PlanCandidate(found)
+        yield planning, PlanCandidate(found)
+        physical = tried[-1].leans_on_air and in_physical_air(planning)
+        if physical:
+            listener.tell("with the air of the simulated robot")
+            yield from ((physical, PlanCandidate(again)) for again in physical.plans())
+            return
+
+
+WITH_AIR = "planned with `model: {}`, since the simulated robot keeps to no plan without its air"
+PHYSICAL = "orifice"  # the shipped model with the air of the shipped simulated robot
+
+
+def in_physical_air(planning: Planning) -> Planning | None:
+    """The planning of the same task with the air of the shipped simulated robot; None where another
+    one executes, or the task changes what that air does not have."""
+    task, document, session = planning.planner.task, planning.document, planning.planner.session
+    if task.plant != PLANT or (task.sequence and "model" not in task.model_fields_set):
+        return None
+    name = PHYSICAL if task.model == PLAIN else f"{task.model}+{PHYSICAL}"
+    own = task.model_copy(update={"model": name})
+    try:
+        new = Planning.of(own, document, deadline=session.control.deadline)
+    except KembaError:  # the task changes an effect of the air that it had
+        return None
+    return replace(new, planner=replace(new.planner, session=session), clock=planning.clock)
 
 
 def _most_robust(

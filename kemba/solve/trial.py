@@ -19,10 +19,7 @@ from kemba.solve.judged import Judged, judged
 from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Array, Trajectory
 
-AIR = (
-    "the simulated robot has physical chambers, and this plan has first-order ones: plan with "
-    "--model orifice on the shipped robot, with `chambers: orifice` in the model of another"
-)
+AIR = "the simulated robot has physical chambers, and this plan's model has first-order ones"
 WELL = 0.5  # of what is allowed: a table that misses by more is worth edges on ticks
 
 
@@ -84,6 +81,15 @@ class Trial:
         return done is not None and done.verdicts["replay"].good and not done.replays
 
     @property
+    def leans_on_air(self) -> bool:
+        """Whether only the simulated robot does not keep to it, which has physical chambers where
+        the plan's model has first-order ones."""
+        done, found = self.judged, self.plan
+        if done is None or done.good or not done.replays or with_lags(found.model) is not None:
+            return False
+        return load_spec(found.task.plant).chambers == "orifice"
+
+    @property
     def misses(self) -> float:
         """The largest error in units of what is allowed; 0 where the plan is good and its table
         well within that."""
@@ -143,25 +149,24 @@ def confirmed(trial: Trial, place: str) -> Trial:
     `place`: the run folder."""
     found, done = trial.plan, trial.judged
     assert done is not None
-    result = {**answer(found, place), **done.facts, **_confirmed(found, done)}
+    result = {**answer(found, place), **done.facts, **_confirmed(trial, done)}
     result["sentence"] = "; ".join([result["sentence"], *warnings(found)])
     feedback = done.feedback
     policy = feedback.arrays if feedback else None
     return replace(trial, result=result, motions=Motions(trial.motions.table, done.motion, policy))
 
 
-def _confirmed(found: Plan, done: Judged) -> dict[str, Any]:
+def _confirmed(trial: Trial, done: Judged) -> dict[str, Any]:
     """What the executions of a plan change in the answer: it stays solved only if all of them come
     near enough."""
-    task = found.task
+    found, task = trial.plan, trial.plan.task
     other, without = another_robot(task.model, task.plant), lacking(task.model, task.plant)
     names = [f"the plant is another robot, {other}, which {task.plant} names"] if other else []
     if without:
         names.append(f"the plant is without {enumerated(without)}, as the plan's model")
     if alike := carried_over(task.model, task.plant, task.payload):
         names.append(f"the plant has {enumerated(alike)}, too")
-    lags = with_lags(found.model) is None and load_spec(task.plant).chambers == "orifice"
-    if lags and done.replays and not done.good:
+    if trial.leans_on_air:
         names.append(AIR)
     facts: dict[str, Any] = {"verdict_on": done.truth.on}
     facts |= {"band": done.band.json() if done.band else None}

@@ -26,6 +26,7 @@ from kemba.config import (
     load_yaml,
     parse,
     shipped_configs,
+    with_added,
 )
 from kemba.config.document import Location
 from kemba.effects import BY_KIND, load_effects
@@ -248,6 +249,8 @@ class Expansion:
 
 def model_name(expansion: Expansion, name: str) -> str:
     """A model as every worker finds it: shipped ones by name, others by their whole path."""
+    if (parts := with_added(name)) is not None:
+        return "+".join(model_name(expansion, part) for part in parts)
     if name in shipped_configs("models") or f"{name}.yaml" in shipped_configs("models"):
         return name
     return str(expansion.found(name, "models").absolute())

@@ -1,6 +1,7 @@
 """A model: the same whatever the order of its list, every row labelled, every mistake explained."""
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from kemba.effects.pneumatics.supply import SupplyScale
 from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
 from kemba.mechanism import load_cylinder, rig_mechanism
-from kemba.model import Model, load_model
+from kemba.model import Model, load_model, load_spec
 
 Values = dict[str, np.ndarray]
 CYLINDER = load_cylinder("dsnu-25-70")
@@ -185,3 +186,14 @@ def test_end_stops_are_not_felt_by_the_rod_sensor() -> None:
     assert "piston/F" in model.node.outputs
     stop = [str(model.node.lam[i]) for i in range(model.node.lam.numel())]
     assert not any(name in str(model.node.outputs["piston/F"]) for name in stop)
+
+
+def test_a_plus_b_is_the_model_a_with_what_the_file_of_b_adds(tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text("base: planning\nrobot: hound\nsupply: 0.65 MPa\n")
+    for name in ("hound", str(tmp_path / "own.yaml")):
+        alone, both, air = (load_spec(each) for each in (name, f"{name}+orifice", "orifice"))
+        assert (both.robot, both.supply, both.chambers) == (alone.robot, alone.supply, "orifice")
+        assert both.name == f"{alone.name}+orifice"
+        assert {e.name for e in both.effects} == {e.name for e in (*alone.effects, *air.effects)}
+    with pytest.raises(KembaError, match="no such file"):
+        load_spec("hound+nothing")

@@ -1,14 +1,18 @@
 """In which order a trial is repaired, and what a plan that no scenario has seen says."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from kemba.model.lags import with_lags
+from kemba.ocp import load_task
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.planning import Planning
 from kemba.solve import loop
-from kemba.solve.loop import STAGES, TICKS, repaired
+from kemba.solve.loop import STAGES, TICKS, Approach, Listener, repaired
 from kemba.solve.trial import Motions, Trial
 
 
@@ -75,3 +79,43 @@ def test_what_misses_says_what_is_repaired(
     planning: Any = SimpleNamespace(over=False)
     execution: Any = SimpleNamespace(tell=lambda _: None)
     assert [each.repair for each in repaired(first, planning, execution)] == repairs
+
+
+def test_the_air_of_the_simulated_robot_is_put_in_the_place_of_that_of_the_model() -> None:
+    planning = Planning.of(*load_task("jump", ["model=hound", "start.fore/foot/x=0.29 m"]))
+    assert with_lags(planning.planner.model) is None
+    found = loop.in_physical_air(planning)
+    assert found is not None
+    assert found.planner.task.model == "hound+orifice"
+    assert with_lags(found.planner.model) is not None
+    assert found.planner.model.mechanism.legs == planning.planner.model.mechanism.legs
+    assert found.planner.session is planning.planner.session  # one time limit, one count
+
+
+@pytest.mark.parametrize("changed", ["plant=own", "effects.mode_damping.c_none=60 N.s.m-1"])
+def test_where_it_has_no_place_the_air_stays(
+    changed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "own.yaml").write_text("base: plant\n")
+    planning = Planning.of(*load_task("jump", [changed.replace("own", "own.yaml")]))
+    assert loop.in_physical_air(planning) is None
+
+
+@pytest.mark.parametrize("leans", [True, False])
+def test_after_a_plan_that_leans_on_its_air_all_others_have_that_of_the_simulated_robot(
+    leans: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tried: Any = []
+    physical: Any = SimpleNamespace(plans=lambda: iter([Found(Status.SOLVED, "again")]))
+    monkeypatch.setattr(loop, "in_physical_air", lambda planning: physical)
+    found = [Found(Status.SOLVED, "first"), Found(Status.SOLVED, "second")]
+    planner = SimpleNamespace(task=SimpleNamespace(robust=0))
+    planning: Any = SimpleNamespace(
+        planner=planner, document=None, plans=lambda origin: iter(found)
+    )
+    said = []
+    for _, one in loop._candidates(planning, tried, Approach(cold=True), Listener(), 0.0):
+        said.append(one.plan.sentence)
+        tried.append(SimpleNamespace(leans_on_air=leans))
+    assert said == ["first", "again" if leans else "second"]

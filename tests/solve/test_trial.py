@@ -55,4 +55,6 @@ def test_first_order_air_is_blamed_where_the_plan_is_right_and_falls(
         replays=replays, good=good, truth=SimpleNamespace(on="full"), band=None, feedback=None,
         remarks=[], causes=["it falls"],
     )  # fmt: skip
-    assert (modules.AIR in modules._confirmed(plan, done)["sentence"]) is said
+    one = Trial(plan, {}, Motions(), done)
+    assert (modules.AIR in modules._confirmed(one, done)["sentence"]) is said
+    assert one.leans_on_air is said
