@@ -212,7 +212,7 @@ def _candidates(
             return
 
 
-WITH_AIR = "planned with `model: {}`, since the simulated robot keeps to no plan without its air"
+WITH_AIR = "planned with `model: {}`, since the simulated robot missed the plan without its air"
 PHYSICAL = "orifice"  # the shipped model with the air of the shipped simulated robot
 
 

@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,13 +10,15 @@ from ocp.runs import solved
 
 from kemba.model import load_model
 from kemba.ocp import load_task, plan
-from kemba.ocp.certificate.certify import certify
-from kemba.ocp.certificate.status import law
+from kemba.ocp.certificate.asked import MeasuredRequirement
+from kemba.ocp.certificate.certify import Certificate, certify
+from kemba.ocp.certificate.status import law, reached
 from kemba.ocp.planner import Planner
 from kemba.ocp.relaxation.schedule import find, fix, tighten
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.symmetry import find_symmetry
+from kemba.trajectory import Trajectory
 
 FILES = [
     "certificate.json",
@@ -59,6 +62,7 @@ def test_the_worst_violation_is_named() -> None:
         ("rear/contact:slip forward", "slip forward of rear/contact"),
         ("front/motor:speed_forward", "speed forward of front/motor"),
         ("start.*/foot/z:front/foot/z", "`start.*/foot/z` on front/foot/z"),
+        ("landing.impact_speed", "`landing.impact_speed`"),
         ("goals.apex:body/z", "`goals.apex` on body/z"),
     ],
 )
@@ -133,3 +137,24 @@ def test_the_papers_method_runs() -> None:
     assert (answer["status"] == "solved") == measured.within(found.task.tolerances)
     assert found.exit_code == (0 if answer["status"] == "solved" else 1)
     assert measured.dynamics < 1e-3, "the equations of motion hold, whatever the pairs do"
+
+
+def test_a_sentence_tells_all_that_a_motion_reaches() -> None:
+    """How far, how fast at the end, and goals beside the height; what stays as it was is not."""
+    goal = MeasuredRequirement("", "goals.apart:gap", 0.25, 0.2, np.inf, "m", 0.0, 1.0, 0, 0.0)
+    asked = (goal, replace(goal, text="goals.apex:body/z"), replace(goal, text="end.rest:body/vx"))
+    found = Certificate(0.0, 0.0, 0.0, 0.0, (), asked)
+    rows = {
+        "body/z [m]": [0.3, 0.5],
+        "body/x [m]": [1.0, 0.7],
+        "body/vx [m.s-1]": [0.0, -1.5],
+        "body/pitch [rad]": [0.0, 2 * np.pi],
+        "body/pitch_rate [rad.s-1]": [0.0, 3.5],
+    }
+    plan = Trajectory(np.array([0.0, 0.6]), {key: np.array(at) for key, at in rows.items()})
+    assert reached(found, plan) == [
+        "apex 0.500 m", "0.30 m back", "turned by 360 deg", "-1.50 m/s at the end",
+        "turning at 3.50 rad/s at the end", "apart 0.25 m", "0.600 s",
+    ]  # fmt: skip
+    still = Trajectory(plan.time, {key: np.array(at)[[0, 0]] for key, at in rows.items()})
+    assert reached(replace(found, asked=()), still) == ["apex 0.300 m", "0.600 s"]

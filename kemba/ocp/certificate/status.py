@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from enum import Enum
 
+import numpy as np
+
 from kemba.ocp.certificate.asked import MeasuredRequirement
 from kemba.ocp.certificate.certify import OF_WEIGHT, Certificate
 from kemba.ocp.nlp.ending import Ending
@@ -44,8 +46,7 @@ def verdict(
     task: Task, certificate: Certificate, trajectory: Trajectory, ending: Ending | None
 ) -> tuple[Status, str]:
     """Status and sentence of a trajectory; `ending` is that of its last solve."""
-    apex = f"apex {max(trajectory['body/z']):.3f} m{_feet(trajectory)}"
-    facts = f"{apex}, {trajectory.time[-1]:.3f} s"
+    facts = ", ".join(reached(certificate, trajectory))
     if ending is Ending.INTERRUPTED:
         what = f"interrupted: best iterate kept, {facts}; {_worst(certificate)}"
         return Status.INTERRUPTED, what
@@ -67,6 +68,34 @@ def verdict(
         return Status.INFEASIBLE, f"the solver finds no motion that meets the task: {worst}"
     why = "the solver ended at a motion that is not possible" if ending.good else ending.sentence
     return Status.STALLED, f"no plan was found, {why}: {worst}"
+
+
+MOVES, TURNS, SPEED, RATE = 0.01, 1.5, 0.05, 0.2  # m, rad, m/s, rad/s: less is not told
+
+
+def reached(certificate: Certificate, plan: Trajectory) -> list[str]:
+    """What a motion comes to, in words: its apex, how far it goes and turns, how fast it ends, what
+    is reached of further goals, and how long it takes."""
+    found = [f"apex {max(plan['body/z']):.3f} m{_feet(plan)}"]
+    rows = {q: plan[f"body/{q}"] for q in ("x", "pitch", "vx", "pitch_rate") if f"body/{q}" in plan}
+    change = {q: float(values[-1] - values[0]) for q, values in rows.items()}
+    last = {q: float(values[-1]) for q, values in rows.items()}
+    if abs(ahead := change.get("x", 0.0)) >= MOVES:
+        found.append(f"{abs(ahead):.2f} m {'ahead' if ahead > 0 else 'back'}")
+    if abs(turned := change.get("pitch", 0.0)) >= TURNS:
+        found.append(f"turned by {np.degrees(turned):.0f} deg")
+    if abs(speed := last.get("vx", 0.0)) >= SPEED:
+        found.append(f"{speed:.2f} m/s at the end")
+    if abs(rate := last.get("pitch_rate", 0.0)) >= RATE:
+        found.append(f"turning at {rate:.2f} rad/s at the end")
+    goals = (each for each in certificate.asked if each.text.startswith("goals."))
+    others = {
+        name: f"{name} {goal.value:.3g} {goal.unit}".removesuffix(" 1")
+        for goal in goals
+        for name, _, what in [goal.text.removeprefix("goals.").partition(":")]
+        if what not in ("body/x", "body/z")  # told already
+    }
+    return [*found, *others.values(), f"{plan.time[-1]:.3f} s"]
 
 
 def _feet(trajectory: Trajectory) -> str:
@@ -96,6 +125,8 @@ def _worst(certificate: Certificate) -> str:
 def law(what: str) -> str:
     """What is violated, in words: `the equation of motion of front/hip/q`."""
     kind, _, name = what.partition(":")
+    if not name:  # `landing.impact_speed`
+        return f"`{kind}`"
     if kind in LAWS:
         return f"{LAWS[kind]} of {name}"
     if kind.endswith("/end_stop"):
