@@ -83,13 +83,14 @@ def main() -> None:
     """Plan the starts that the record lacks; print or save the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=0, help="starts of each")
+    parser.add_argument("--of", nargs="*", default=[*TASKS], choices=[*TASKS])
     parser.add_argument("--limit", type=float, default=120.0, help="s of a start")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--save", type=Path, help="page whose table is replaced")
     asked = parser.parse_args()
     record = Record(RECORD)
     have = record.known("what", "seed")
-    jobs = [(what, seed, asked.limit) for seed in range(asked.count) for what in TASKS]
+    jobs = [(what, seed, asked.limit) for seed in range(asked.count) for what in asked.of]
     with ProcessPoolExecutor(asked.jobs, get_context("spawn")) as pool:
         left = [pool.submit(planned, job) for job in jobs if job[:2] not in have]
         for done in as_completed(left):

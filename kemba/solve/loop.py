@@ -10,6 +10,7 @@ give the trial of the best score; where the plant keeps to none, the best that i
 feedback                            kemba.solve.feedback
 """
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -208,8 +209,24 @@ def _candidates(
         physical = tried[-1].leans_on_air and in_physical_air(planning)
         if physical:
             listener.tell("with the air of the simulated robot")
-            yield from ((physical, PlanCandidate(again)) for again in physical.plans())
+            enough = deadline - time.monotonic() > planning.clock.wall
+            for again in in_turn(physical, tried[-1].plan, guesses_first=enough):
+                yield physical, PlanCandidate(again)
             return
+
+
+def in_turn(planning: Planning, old: Plan, guesses_first: bool) -> Iterator[Plan]:
+    """Plans from guesses, which may be much cheaper, and the one from the `old` plan of another
+    model, which is sooner found."""
+
+    def near() -> Iterator[Plan]:
+        known = old.trajectory, old.model, old.requirements
+        found, _ = planning.continued(Origin(*known, "the plan with other air", stages=old.stages))
+        if found is not None:
+            yield replace(found, continued=None, start=old.start)
+
+    ways = [planning.plans(), near()]
+    yield from itertools.chain(*(ways if guesses_first else reversed(ways)))
 
 
 WITH_AIR = "planned with `model: {}`, since the simulated robot missed the plan without its air"

@@ -1,6 +1,7 @@
 """In which order a trial is repaired, and what a plan that no scenario has seen says."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,8 +9,9 @@ from typing import Any
 import pytest
 
 from kemba.model.lags import with_lags
-from kemba.ocp import load_task
+from kemba.ocp import Plan, load_task
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.planning import Planning
 from kemba.solve import loop
 from kemba.solve.loop import STAGES, TICKS, Approach, Listener, repaired
@@ -107,15 +109,39 @@ def test_after_a_plan_that_leans_on_its_air_all_others_have_that_of_the_simulate
     leans: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried: Any = []
-    physical: Any = SimpleNamespace(plans=lambda: iter([Found(Status.SOLVED, "again")]))
+    physical: Any = SimpleNamespace()
+    again = [Found(Status.SOLVED, "again")]
+    monkeypatch.setattr(loop, "in_turn", lambda planning, old, guesses_first: iter(again))
     monkeypatch.setattr(loop, "in_physical_air", lambda planning: physical)
     found = [Found(Status.SOLVED, "first"), Found(Status.SOLVED, "second")]
     planner = SimpleNamespace(task=SimpleNamespace(robust=0))
-    planning: Any = SimpleNamespace(
-        planner=planner, document=None, plans=lambda origin: iter(found)
-    )
+    plans: Any = {"document": None, "plans": lambda origin: iter(found)}
+    planning: Any = SimpleNamespace(planner=planner, clock=SimpleNamespace(wall=1.0), **plans)
     said = []
     for _, one in loop._candidates(planning, tried, Approach(cold=True), Listener(), 0.0):
         said.append(one.plan.sentence)
-        tried.append(SimpleNamespace(leans_on_air=leans))
+        tried.append(SimpleNamespace(leans_on_air=leans, plan=one.plan))
     assert said == ["first", "again" if leans else "second"]
+
+
+@pytest.mark.parametrize("guesses_first", [True, False])
+def test_the_plan_with_other_air_is_continued_before_guesses_where_time_is_short(
+    guesses_first: bool,
+) -> None:
+    """Guesses are made when they are asked for, and the old plan is continued then, too."""
+    made: list[str] = []
+
+    def guesses() -> Iterator[Any]:
+        made.append("guess")
+        yield SimpleNamespace(sentence="guess")
+
+    def continued(origin: Origin) -> tuple[Any, str]:
+        made.append("continued")
+        return (replace(old, sentence="continued") if origin.plan is old.trajectory else None), ""
+
+    nothing: Any = None
+    at: Any = "where it is"
+    old = Plan(nothing, nothing, (), at, nothing, Status.SOLVED, "old", {}, 0, 0)
+    planning: Any = SimpleNamespace(plans=guesses, continued=continued)
+    first = next(loop.in_turn(planning, old, guesses_first))
+    assert made == ["guess" if guesses_first else "continued"] == [first.sentence]
