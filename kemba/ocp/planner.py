@@ -34,10 +34,11 @@ from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
 
 
-def grids(nodes: int) -> list[int]:
-    """Numbers of nodes from coarse to fine, each about half of the next."""
+def grids(nodes: int, duration: float) -> list[int]:
+    """Numbers of nodes from coarse to fine, each about half of the next, of a motion that lasts
+    `duration` [s]."""
     found = [nodes // 2, nodes]
-    while found[0] > Grids.finest:
+    while found[0] > Grids.finest and duration <= Grids.longest * (found[0] // 2):
         found.insert(0, found[0] // 2)
     return found
 
@@ -117,7 +118,7 @@ class Planner:
             yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 
     def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
-        first, *finer = grids(self.task.nodes)
+        first, *finer = grids(self.task.nodes, self.task.duration)
         schedule = self.schedule(first, reduction)
         point = self._sought(schedule)
         for nodes in finer:

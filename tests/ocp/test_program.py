@@ -120,8 +120,18 @@ def test_a_guess_is_within_bounds(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("nodes", "expected"),
-    [(100, [50, 100]), (60, [30, 60]), (400, [50, 100, 200, 400]), (250, [62, 125, 250])],
+    ("nodes", "duration", "expected"),
+    [
+        (100, 0.7, [50, 100]),
+        (60, 0.4, [30, 60]),
+        (400, 0.7, [50, 100, 200, 400]),
+        (250, 0.7, [62, 125, 250]),
+        (200, 1.0, [50, 100, 200]),
+        (200, 1.4, [100, 200]),  # chambers fill within a step of 28 ms
+        (100, 5.0, [50, 100]),
+    ],
 )
-def test_valves_are_sought_on_coarse_grids(nodes: int, expected: list[int]) -> None:
-    assert grids(nodes) == expected
+def test_valves_are_sought_on_coarse_grids(
+    nodes: int, duration: float, expected: list[int]
+) -> None:
+    assert grids(nodes, duration) == expected
