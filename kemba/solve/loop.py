@@ -5,13 +5,14 @@ for each start:                     an earlier plan, one guess after the other
     for each repair:                nothing, more stages an element, edges on ticks
         execute and judge           kemba.solve.trial
     stop if the best trial is good
-    from here on with physical chambers, if only the simulated robot misses, which has them
+    in turn with physical chambers, if only the simulated robot misses, which has them
 give the trial of the best score; where the plant keeps to none, the best that it keeps to with
 feedback                            kemba.solve.feedback
 """
 
 import itertools
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -204,15 +205,20 @@ def _candidates(
         from kemba.solve.memory import recalled
 
         origin = recalled(task, planning.planner.model, listener.tell)
-    for found in planning.plans(origin):
-        yield planning, PlanCandidate(found)
-        physical = tried[-1].leans_on_air and in_physical_air(planning)
-        if physical:
+    physical: Planning | None = None
+    turns = deque([(planning, planning.plans(origin))])
+    while turns:
+        current, plans = turns.popleft()
+        found = next(plans, None)
+        if found is None:
+            continue
+        turns.append((current, plans))
+        yield current, PlanCandidate(found)
+        leans = physical is None and tried[-1].leans_on_air
+        if leans and (physical := in_physical_air(planning)):
             listener.tell("with the air of the simulated robot")
             enough = deadline - time.monotonic() > planning.clock.wall
-            for again in in_turn(physical, tried[-1].plan, guesses_first=enough):
-                yield physical, PlanCandidate(again)
-            return
+            turns.appendleft((physical, in_turn(physical, tried[-1].plan, guesses_first=enough)))
 
 
 def in_turn(planning: Planning, old: Plan, guesses_first: bool) -> Iterator[Plan]:

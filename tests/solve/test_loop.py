@@ -105,15 +105,15 @@ def test_where_it_has_no_place_the_air_stays(
 
 
 @pytest.mark.parametrize("leans", [True, False])
-def test_after_a_plan_that_leans_on_its_air_all_others_have_that_of_the_simulated_robot(
+def test_after_a_plan_that_leans_on_its_air_every_other_one_has_that_of_the_simulated_robot(
     leans: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tried: Any = []
     physical: Any = SimpleNamespace()
-    again = [Found(Status.SOLVED, "again")]
+    again = [Found(Status.SOLVED, "again"), Found(Status.SOLVED, "and again")]
     monkeypatch.setattr(loop, "in_turn", lambda planning, old, guesses_first: iter(again))
     monkeypatch.setattr(loop, "in_physical_air", lambda planning: physical)
-    found = [Found(Status.SOLVED, "first"), Found(Status.SOLVED, "second")]
+    found = [Found(Status.SOLVED, name) for name in ("first", "second", "third", "fourth")]
     planner = SimpleNamespace(task=SimpleNamespace(robust=0))
     plans: Any = {"document": None, "plans": lambda origin: iter(found)}
     planning: Any = SimpleNamespace(planner=planner, clock=SimpleNamespace(wall=1.0), **plans)
@@ -121,7 +121,8 @@ def test_after_a_plan_that_leans_on_its_air_all_others_have_that_of_the_simulate
     for _, one in loop._candidates(planning, tried, Approach(cold=True), Listener(), 0.0):
         said.append(one.plan.sentence)
         tried.append(SimpleNamespace(leans_on_air=leans, plan=one.plan))
-    assert said == ["first", "again" if leans else "second"]
+    last = ["second", "third", "fourth"]
+    assert said == ["first", *(["again", "second", "and again", *last[1:]] if leans else last)]
 
 
 @pytest.mark.parametrize("guesses_first", [True, False])
