@@ -127,7 +127,8 @@ def test_a_guess_is_within_bounds(name: str) -> None:
         (400, 0.7, [50, 100, 200, 400]),
         (250, 0.7, [62, 125, 250]),
         (200, 1.0, [50, 100, 200]),
-        (200, 1.4, [100, 200]),  # chambers fill within a step of 28 ms
+        (200, 1.4, [50, 100, 200]),
+        (282, 2.7, [141, 282]),  # chambers fill within a step of 38 ms
         (100, 5.0, [50, 100]),
     ],
 )

@@ -51,6 +51,6 @@ class Grids:
     reach = 4  # nodes by which a switch may move
     coarsest = 24  # nodes of the coarsest grid
     finest = 80  # nodes of the finest grid on which valves are sought, unless its steps are long
-    # s; the longest step on which valves are sought: chambers fill in 6 to 40 ms (with steps of
-    # 28 ms a run of 1.8 s had no plan, with 14 ms it has one on nodes)
-    longest = 0.02
+    # s; the longest step on which valves are sought: chambers fill in up to 40 ms (with steps of
+    # 38 ms a run of 2.7 s had no plan, with 19 ms it has one on nodes)
+    longest = 0.03
