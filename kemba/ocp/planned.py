@@ -186,9 +186,7 @@ def answer(plan: Plan, run: str) -> dict[str, Any]:
         **dict.fromkeys(("replay", "table_replay", "plant_replay", "impacts")),  # once executed
         "requirements": [measured.json() for measured in certificate.asked],
         "reached": {
-            measured.text.removeprefix("goals.").partition(":")[0]: measured.value
-            for measured in certificate.asked
-            if measured.text.startswith("goals.")
+            measured.goal: measured.value for measured in certificate.asked if measured.goal
         },
         **dict.fromkeys(("verdict_on", "band", "robust", "strides")),  # the same
         "good": plan.status is Status.SOLVED,

@@ -10,7 +10,6 @@ give the trial of the best score; where the plant keeps to none, the best that i
 feedback                            kemba.solve.feedback
 """
 
-import itertools
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -214,7 +213,7 @@ def _candidates(
             continue
         turns.append((current, plans))
         yield current, PlanCandidate(found)
-        leans = physical is None and tried[-1].leans_on_air
+        leans = physical is None and not planning.over and tried[-1].leans_on_air
         if leans and (physical := in_physical_air(planning)):
             listener.tell("with the air of the simulated robot")
             enough = deadline - time.monotonic() > planning.clock.wall
@@ -232,20 +231,22 @@ def in_turn(planning: Planning, old: Plan, guesses_first: bool) -> Iterator[Plan
             yield replace(found, continued=None, start=old.start)
 
     ways = [planning.plans(), near()]
-    yield from itertools.chain(*(ways if guesses_first else reversed(ways)))
+    for way in ways if guesses_first else reversed(ways):
+        if not planning.over:
+            yield from way
 
 
 WITH_AIR = "planned with `model: {}`, since the simulated robot missed the plan without its air"
-PHYSICAL = "orifice"  # the shipped model with the air of the shipped simulated robot
+ITS_AIR = "orifice"  # the shipped model with the air of the shipped simulated robot
 
 
 def in_physical_air(planning: Planning) -> Planning | None:
     """The planning of the same task with the air of the shipped simulated robot; None where another
     one executes, or the task changes what that air does not have."""
     task, document, session = planning.planner.task, planning.document, planning.planner.session
-    if task.plant != PLANT or (task.sequence and "model" not in task.model_fields_set):
+    if task.plant != PLANT:
         return None
-    name = PHYSICAL if task.model == PLAIN else f"{task.model}+{PHYSICAL}"
+    name = ITS_AIR if task.model == PLAIN else f"{task.model}+{ITS_AIR}"
     own = task.model_copy(update={"model": name})
     try:
         new = Planning.of(own, document, deadline=session.control.deadline)

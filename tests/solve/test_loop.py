@@ -116,7 +116,9 @@ def test_after_a_plan_that_leans_on_its_air_every_other_one_has_that_of_the_simu
     found = [Found(Status.SOLVED, name) for name in ("first", "second", "third", "fourth")]
     planner = SimpleNamespace(task=SimpleNamespace(robust=0))
     plans: Any = {"document": None, "plans": lambda origin: iter(found)}
-    planning: Any = SimpleNamespace(planner=planner, clock=SimpleNamespace(wall=1.0), **plans)
+    planning: Any = SimpleNamespace(
+        planner=planner, clock=SimpleNamespace(wall=1.0), over=False, **plans
+    )
     said = []
     for _, one in loop._candidates(planning, tried, Approach(cold=True), Listener(), 0.0):
         said.append(one.plan.sentence)
@@ -143,6 +145,6 @@ def test_the_plan_with_other_air_is_continued_before_guesses_where_time_is_short
     nothing: Any = None
     at: Any = "where it is"
     old = Plan(nothing, nothing, (), at, nothing, Status.SOLVED, "old", {}, 0, 0)
-    planning: Any = SimpleNamespace(plans=guesses, continued=continued)
+    planning: Any = SimpleNamespace(plans=guesses, continued=continued, over=False)
     first = next(loop.in_turn(planning, old, guesses_first))
     assert made == ["guess" if guesses_first else "continued"] == [first.sentence]

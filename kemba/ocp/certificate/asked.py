@@ -54,6 +54,12 @@ class MeasuredRequirement:
     time_s: float
 
     @property
+    def goal(self) -> str:
+        """The name of the goal that it is, empty for all else."""
+        kind, _, name = self.text.partition(":")[0].partition(".")
+        return name if kind == "goals" else ""
+
+    @property
     def miss(self) -> float:
         """How far the value is beyond its limits; infinite where there is none."""
         over = max(self.lower - self.value, self.value - self.upper, 0.0)

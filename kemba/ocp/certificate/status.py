@@ -88,12 +88,10 @@ def reached(certificate: Certificate, plan: Trajectory) -> list[str]:
         found.append(f"{speed:.2f} m/s at the end")
     if abs(rate := last.get("pitch_rate", 0.0)) >= RATE:
         found.append(f"turning at {rate:.2f} rad/s at the end")
-    goals = (each for each in certificate.asked if each.text.startswith("goals."))
     others = {
-        name: f"{name} {goal.value:.3g} {goal.unit}".removesuffix(" 1")
-        for goal in goals
-        for name, _, what in [goal.text.removeprefix("goals.").partition(":")]
-        if what not in ("body/x", "body/z")  # told already
+        asked.goal: f"{asked.goal} {asked.value:.3g} {asked.unit}".removesuffix(" 1")
+        for asked in certificate.asked
+        if asked.goal and not asked.text.endswith((":body/x", ":body/z"))  # told already
     }
     return [*found, *others.values(), f"{plan.time[-1]:.3f} s"]
 

@@ -175,7 +175,9 @@ class Continuation:
         def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
             return solve_along(program, Iterate(x), options, self.control, stagnation)
 
-        if not found.solved and (self.origin.ticks or self.origin.finer):  # it changes little
+        assert found.ending is not None
+        near = self.origin.ticks or self.origin.finer  # the plan changes little
+        if near and not found.solved and not found.ending.cut_short:
             self.tell(f"from {self.origin.name}: by steps that stay near it")
             program, found = proximal_points(make, solve, program, x) or (program, found)
         assert found.ending is not None

@@ -37,7 +37,6 @@ from kemba.ocp.refinement.start import (
     to_trajectory,
     warm,
 )
-from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.solution import arrays
@@ -163,7 +162,7 @@ class Refiner:
         inputs = self.reduction.restrict("u", arrays(self.model, self.plan)["u"])
         valves = np.round(inputs[:, valve_columns(self.model, self.reduction)])
         brief = LASTS if self.task.clearance else 0.0
-        asked = stands(self.model, self.task, len(self.plan))
+        asked = stands(self.requirements, len(self.plan))
         return read_phases(
             self.model, constraints, self.plan, valves, self.marks, trim, brief, asked
         )
@@ -284,7 +283,8 @@ class Refiner:
 
         program, start = make(other, x)
         solution = program, solve(program, start)
-        if not solution[1].solved:
+        ending = solution[1].ending
+        if not solution[1].solved and not (ending and ending.cut_short):
             self.tell("phases: by steps that stay near the last plan")
             solution = proximal_points(make, solve, other, x) or solution
         return solution, read(*solution)
@@ -342,18 +342,18 @@ def read(program: PhaseProgram, last: Iterate) -> Refined:
     return replace(found, trajectory=trajectory, certificate=measured, stages=own)
 
 
-def stands(model: Model, task: Task, rows: int) -> dict[str, np.ndarray]:
+def stands(requirements: Sequence[Requirement], rows: int) -> dict[str, np.ndarray]:
     """Whether a foot stands at each of the `rows` (rows,), by the label of its contact, as the
     task's `contacts` say; empty where it says nothing."""
-    if not task.contacts:
-        return {}
-    at = np.arange(rows) / (rows - 1)
-    found = {leg: np.zeros(rows, dtype=bool) for leg in model.mechanism.legs}
-    for part, (begin, end) in zip(task.contacts, spans(task.contacts), strict=True):
-        inside = (at > begin + 1e-9) & (at <= end + 1e-9) | ((at == 0.0) & (begin == 0.0))
-        for leg in part.on:
-            found[leg] |= inside
-    return {f"{leg}/contact:gap": on for leg, on in found.items()}
+    found: dict[str, np.ndarray] = {}
+    for asked in (r for r in requirements if r.location[0] == "contacts"):
+        leg, _, what = asked.quantity.name.partition("/")
+        on = found.setdefault(f"{leg}/contact:gap", np.zeros(rows, dtype=bool))
+        if what != "foot/Fz":  # its gap is zero; of a foot in the air the force is
+            on[asked.nodes(rows - 1)] = True
+    for on in found.values():
+        on[0] = on[1]  # forces, and so stances, are those of the intervals before a node
+    return found
 
 
 def order_of(
