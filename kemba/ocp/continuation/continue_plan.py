@@ -5,9 +5,8 @@ A table with many short pulses loses millimetres when its edges are rounded afte
 edges on ticks beforehand the plan is the best one that a table can hold.
 """
 
-import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.phases.mesh import shared
 from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
@@ -123,9 +123,9 @@ class Continuation:
             finer = renoded(start, phases, nodes, marks, even=False)
             if finer is not None:
                 yield Mesh(*finer, stages)
-        shared = renoded(start, phases, nodes, marks)
-        if shared is not None:
-            yield Mesh(*shared, None)
+        even = renoded(start, phases, nodes, marks)
+        if even is not None:
+            yield Mesh(*even, None)
 
     def _is_kept(self, found: Refined) -> bool:
         """Whether a plan keeps to the tolerances, and costs not so much more than the earlier one
@@ -230,44 +230,13 @@ def renoded(
 ) -> tuple[Trajectory, list[Phase]] | None:
     """The plan on `nodes` intervals and its phases there, each with intervals by how long it lasts;
     without `even` in proportion to those it has, so that what the task asks at nodes stays at the
-    same moments.
-
-    `marks`: fractions of the nodes at which the task asks for something; phases end there, before
-    and after. None where a phase would be left without an interval.
-    """
-    old = phases[-1].last
-    edges = sorted({0.0, 1.0, *(mark for mark in marks if 0.0 < mark < 1.0)})
-    fixed = {round(edge * old): round(edge * nodes) for edge in edges}
-    counts: list[int] = []
-    stops = sorted(fixed)
-    for a, b in itertools.pairwise(stops):
-        inside = [p for p in phases if a <= p.first and p.last <= b]
-        if not inside or inside[0].first != a or inside[-1].last != b:
-            return None
-        t = plan.time
-        weights = [float(t[p.last] - t[p.first] if even else p.elements) for p in inside]
-        share = _shared(weights, fixed[b] - fixed[a])
-        if share is None:
-            return None
-        counts += share
-    borders = np.concatenate([[0], np.cumsum(counts)])
-    found = [
-        replace(p, first=int(borders[i]), last=int(borders[i + 1])) for i, p in enumerate(phases)
-    ]
-    return _resampled(plan, phases, counts), found
-
-
-def _shared(weights: Sequence[float], total: int) -> list[int] | None:
-    """`total` intervals shared in proportion to `weights`, at least one each."""
-    if total < len(weights):
+    same moments; see `shared`."""
+    t = plan.time
+    lasts = [float(t[p.last] - t[p.first] if even else p.elements) for p in phases]
+    found = shared(phases, lasts, nodes, marks)
+    if found is None:
         return None
-    wanted = np.array(weights) * total / sum(weights)
-    counts = np.maximum(1, np.round(wanted)).astype(int)
-    while counts.sum() != total:
-        sign = 1 if counts.sum() < total else -1
-        gain = np.where((counts > 1) | (sign > 0), sign * (wanted - counts), -np.inf)
-        counts[int(np.argmax(gain))] += sign
-    return [int(c) for c in counts]
+    return _resampled(plan, phases, [p.elements for p in found]), found
 
 
 def _resampled(plan: Trajectory, phases: Sequence[Phase], counts: Sequence[int]) -> Trajectory:

@@ -14,6 +14,7 @@ from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.between import add_missed
+from kemba.ocp.phases.mesh import shared
 from kemba.ocp.phases.mode_constraints import (
     ContradictionError,
     Independent,
@@ -243,15 +244,16 @@ class Refiner:
         """An exact solution, from the nearest solution `x` (size,) with the coarser scheme
         first."""
         self.tell(Stage("phases: the best plan", 2, SOLVES))
-        program, start = self.build(near.phases, self.plan, RADAU3)
-        best = self._solve(program, x[: len(start)], rough(Refining.rough_iterations))
+        program, start = self.build(self.evened(near, x), (near, x), RADAU3)
+        best = self._solve(program, start, rough(Refining.rough_iterations))
         found = ended(program, best)
         if best.solved:
             simpler = self.simpler(program, best.Y)
             if simpler is not None:
                 return simpler
-        for way in [best.Y] * best.solved + [x] * (not found.done):
-            found = self.fine(program, way)
+        ways = [(program, best.Y)] * best.solved + [(near, x)] * (not found.done)
+        for way in ways:
+            found = self.fine(*way)
             if found.done:
                 break
         return found
@@ -271,12 +273,21 @@ class Refiner:
             self.solution = solution
         return made
 
+    def evened(self, program: PhaseProgram, x: np.ndarray) -> list[Phase]:
+        """The phases of a program with elements shared by how long they last in `x` (size,): one
+        read off a single node may last longer than its element can."""
+        each = zip(program.phases, x[program.columns.h[:, 0]], strict=True)
+        fractions = [w.at for w in self.requirements if w.at is not None]
+        lasts = [phase.elements * float(h) for phase, h in each]
+        return shared(program.phases, lasts, program.nodes, fractions) or program.phases
+
     def _by(self, scheme: Scheme, other: PhaseProgram, x: np.ndarray) -> tuple[Solution, Refined]:
-        """The exact program with a scheme, solved from a solution `x` (size,) of another one; where
-        that fails, by proximal points."""
+        """The exact program with a scheme, solved from a solution `x` (size,) of another one, its
+        elements shared by how long phases last there; where that fails, by proximal points."""
+        phases = self.evened(other, x)
 
         def make(near: PhaseProgram, x: np.ndarray) -> tuple[PhaseProgram, np.ndarray]:
-            return self.build(other.phases, (near, x), scheme)
+            return self.build(phases, (near, x), scheme)
 
         def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
             return self._solve(program, x, warm(Refining.rough_iterations))

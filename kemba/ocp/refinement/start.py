@@ -66,8 +66,8 @@ def _between(times: np.ndarray, rows: np.ndarray, now: np.ndarray) -> np.ndarray
 
 
 def carried(program: PhaseProgram, old: Columns, points: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The scaled variables (size,) of `program` from a solution `x` of the same phases, on the same
-    number of elements or another, or of other phases on the same elements.
+    """The scaled variables (size,) of `program` from a solution `x` of the same order of phases on
+    other elements, or of other phases on the same ones.
 
     Its variables are at the columns `old`, by a scheme with stages at `points`. States and forces
     are read off the polynomials of its elements, inputs in the middle of each new one.
@@ -76,7 +76,8 @@ def carried(program: PhaseProgram, old: Columns, points: np.ndarray, x: np.ndarr
     knots = np.concatenate([[0.0], points])
     lasting = x[old.h[old.phase_of, 0]]
     ends = np.concatenate([[0.0], np.cumsum(lasting)])
-    same = program.nodes == len(lasting)
+    orders = [[(p.modes, p.valves) for p in phases] for phases in (program.phases, old.phases)]
+    same = program.nodes == len(lasting) and orders[0] != orders[1]
     for g in STATE:
         y[c.first[g]] = x[old.first[g]]
     for p, phase in enumerate(program.phases):
