@@ -30,7 +30,8 @@ def built() -> tuple[PhaseProgram, np.ndarray]:
     binary = np.array([q.binary for q in model.inputs.values()])
     inputs = half.restrict("u", arrays(model, plan)["u"])
     valves = np.round(inputs[:, half.B["u"][binary].any(axis=0)])
-    phases = read_phases(model, read_constraints(model, half), plan, valves, refiner.marks)
+    marks = refiner.marks(len(plan) - 1)
+    phases = read_phases(model, read_constraints(model, half), plan, valves, marks)
     return refiner.build(phases, plan, RADAU3)
 
 

@@ -48,7 +48,7 @@ def test_a_plan_on_ticks_has_its_edges_there() -> None:
 
 def test_the_same_plan_with_five_stages_an_element_executes_more_exactly() -> None:
     """Its own stages then begin what is solved from it."""
-    task, document = load_task("jump_forward.yaml", ["nodes=60"])
+    task, document = load_task("jump_forward.yaml", ["nodes=40"])
     planning = Planning.of(task, document)
     plans = [next(planning.plans())]
     for how in ({"finer": True}, {"ticks": True}):
@@ -78,6 +78,22 @@ def edges(half: bool, borders: list[float], shortest: float, longest: float) -> 
     found = edge_times(model, reduction, phases, np.array([0.0, *borders]), *limits)
     assert list(found) == [1, 2, 3]
     return np.array(list(found.values()))
+
+
+def test_edges_of_a_valve_stay_as_far_apart_as_it_must_dwell() -> None:
+    """A pulse of just the dwell whose begin waits for the phase before it would end too soon."""
+    model, dwell = load_model("planning"), 0.01
+    valves = [(0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.0, 1.0)]
+    phases = [Phase(i, i + 1, (), (*own, 0.0, 0.0)) for i, own in enumerate(valves)]
+    borders = np.array([0.0, 0.0998, 0.1, 0.11])
+    limits = np.array([0.0, 1.2e-3, 0.0, 0.0]), np.ones(4)
+
+    def pulse(*least: float) -> float:
+        found = edge_times(model, whole(model.node), phases, borders, *limits, *least)
+        return found[3] - found[2]
+
+    assert pulse() < dwell - PERIOD / 2
+    assert dwell - 1e-9 < pulse(dwell) < dwell + PERIOD
 
 
 @pytest.mark.parametrize("half", [True, False])

@@ -110,8 +110,8 @@ class Continuation:
 
     def _meshes(self, start: Trajectory, reduction: Reduction) -> Iterator[Mesh]:
         """The earlier plan on the task's nodes: in proportion to those of its phases, where its
-        stages are known and on no more; then shared by how long phases last. Nothing where its
-        notes do not fit."""
+        stages are known, and on no fewer than it has; then shared by how long phases last. Nothing
+        where its notes do not fit."""
         constraints = read_constraints(self.model, reduction)
         valves = len(valve_columns(self.model, reduction))
         phases = noted_phases(start.meta, constraints, valves, len(start) - 1)
@@ -119,8 +119,8 @@ class Continuation:
             return
         marks = [r.at for r in self.requirements if r.at is not None]
         stages, nodes = self.origin.stages, self.task.nodes
-        if stages is not None and tuple(phases) == stages.phases and stages.nodes <= nodes:
-            finer = renoded(start, phases, nodes, marks, even=False)
+        if stages is not None and tuple(phases) == stages.phases:
+            finer = renoded(start, phases, max(nodes, stages.nodes), marks, even=False)
             if finer is not None:
                 yield Mesh(*finer, stages)
         even = renoded(start, phases, nodes, marks)
@@ -264,13 +264,14 @@ def edge_times(
     borders: np.ndarray,
     shortest: np.ndarray,
     longest: np.ndarray,
+    dwell: float = 0.0,
 ) -> dict[int, float]:
     """When [s] phases that begin with a valve edge should begin, so that all edges are on ticks and
     the phases between two of them can last that long.
 
     `borders` (phases,): when they begin now; the first one stays at 0. `shortest`, `longest`
-    (phases,): how long [s] they may last. Where edges of one moment
-    have dead times that are no whole ticks apart, the first valve decides.
+    (phases,): how long [s] they may last; `dwell` [s]: between two edges of a valve at least. Where
+    edges of one moment have dead times that are no whole ticks apart, the first valve decides.
     """
     valves, edges, owners = _valves(model, reduction), [], []
     dead_times = [time for leg in model.mechanism.legs for time in model.timing(leg)]
@@ -293,12 +294,16 @@ def edge_times(
             if p:
                 found.setdefault(p, (tick - lead) * PERIOD + late)
     before, last = 0, 0.0
+    switched: dict[int, float] = {}  # when each valve was
     for p, time in sorted(found.items()):
         least, most = (last + each[before:p].sum() for each in (shortest, longest))
+        turned = [j for j, u in enumerate(phases[p].valves) if u != phases[p - 1].valves[j]]
+        least = max([least, *(switched[j] + dwell for j in turned if j in switched)])
         later = ceil(max(0.0, least - time) / PERIOD - ROUNDING)
         sooner = ceil(max(0.0, time - most) / PERIOD - ROUNDING)
         before, last = p, time + (later - sooner) * PERIOD
         found[p] = last
+        switched |= dict.fromkeys(turned, last)
     return dict(sorted(found.items()))
 
 
@@ -318,7 +323,8 @@ def on_ticks(program: PhaseProgram, x: np.ndarray) -> None:
     elements = np.array([phase.elements for phase in phases])
     lasts, *limits = (elements * at[h] * STEP for at in (x, program.lower, program.upper))
     borders = np.concatenate([[0.0], np.cumsum(lasts)[:-1]])
-    for p, time in edge_times(program.model, program.reduction, phases, borders, *limits).items():
+    known = program.model, program.reduction, phases, borders
+    for p, time in edge_times(*known, *limits, program.task.min_dwell).items():
         z = ca.SX.sym("h", p)
         begins = ca.dot(z, ca.DM([phase.elements for phase in phases[:p]]))
         program.add("valve edge", z, begins, time / STEP, time / STEP, [h[:p]])

@@ -148,8 +148,11 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
 
 
 def _held(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> None:
-    """The rate of a closed gap is zero, and the slip of a sticking contact."""
+    """A closed gap stays zero, and so does its rate, and the slip of a sticking contact."""
     c, phases = program.columns, program.phases
+    gap = view.of(constraint.gap) / LENGTH
+    ends = [(p, c.end(e + 1)["q"]) for e, p in enumerate(c.phase_of) if phases[p].active(i)]
+    program.mode_constraint(i, "stays", view.z("q"), gap, 0.0, 0.0, ends)
     rate = view.of(constraint.rate) / SPEED
     states: Where = [
         (c.phase_of[e], np.concatenate([stage["q"], stage["v"]]))

@@ -25,8 +25,9 @@ class Columns:
     """Indices of everything in the vector x of a multi-phase program.
 
     `first`: state at the start, by group; `stages[e][i]`: state and forces at stage i of element e;
-    `u` (elements, nu): inputs; `h` (phases, 1): element durations; `after`, `impulse`: velocities
-    after and impulses at the impact that begins a phase.
+    `drift` (elements, constraints): of closed gaps; `u` (elements, nu): inputs; `h` (phases, 1):
+    element durations; `after`, `impulse`: velocities after and impulses at the impact that begins a
+    phase.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class Columns:
             for _ in range(elements)
         ]
         smooth = [i for i in range(n["u"]) if i not in binary]
+        self.drift = self.more(elements, len(phases[0].modes))
         self.u = np.empty((elements, n["u"]), dtype=int)
         self.h = np.empty((len(phases), 1), dtype=int)
         for p, phase in enumerate(phases):
@@ -68,6 +70,7 @@ class Columns:
             for stage in stages:
                 for index in stage.values():
                     found[index] = e + 1
+            found[self.drift[e]] = e + 1
         for p, index in self.after.items():
             found[index] = found[self.impulse[p]] = self.phases[p].first
         return found
@@ -91,7 +94,7 @@ class Columns:
         start = self.begin(e)
         parts = [start[g] for g in STATE]
         parts += [stage[g] for stage in self.stages[e] for g in (*STATE, "lam")]
-        return np.concatenate([*parts, self.u[e], self.h[self.phase_of[e]]])
+        return np.concatenate([*parts, self.drift[e], self.u[e], self.h[self.phase_of[e]]])
 
 
 INF = np.inf
@@ -167,7 +170,8 @@ class PhaseProgram:
         ]
         self.columns = Columns(self.layout, phases, self.impacts, scheme.stages)
         self.lower, self.upper = self._bounds()
-        self.element = element(model, self.layout, reduction, task.cost, scheme)
+        gaps = [constraint.gap for constraint in constraints]
+        self.element = element(model, self.layout, reduction, task.cost, scheme, gaps)
         self.jump = impact(model, self.layout, reduction)
         self.added: list[PhasePart] = []
         self.requirements: Sequence[Requirement] = ()
@@ -196,6 +200,8 @@ class PhaseProgram:
                 lower[stage["s"]] = vented
                 self._forces(lower, upper, stage["lam"], self.phases[c.phase_of[e]].modes)
             put(c.u[e], "u")
+            is_open = [not self.phases[c.phase_of[e]].active(i) for i in range(c.drift.shape[1])]
+            lower[c.drift[e, is_open]] = upper[c.drift[e, is_open]] = 0.0
         nominal = self.task.duration / self.nodes / layout.scale[layout.slices["h"]]
         lower[c.h[:, 0]] = Elements.shortest * nominal
         upper[c.h[:, 0]] = Elements.longest * nominal

@@ -1,6 +1,6 @@
 """Radau IIA collocation of one element and an inelastic impact, as scaled rows of the residual."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ from numpy.polynomial import legendre
 
 from kemba.model import Model
 from kemba.ocp.task.costs import running
+from kemba.ocp.task.requirement import SCALES
 from kemba.ocp.task.task import CostTerm
 from kemba.ocp.transcription.layout import GROUPS, STEP, Layout
 from kemba.ocp.transcription.stage import COST_SCALE, project
@@ -51,7 +52,12 @@ RADAU3, RADAU5, RADAU9 = radau(2), radau(3), radau(5)
 
 @dataclass(frozen=True)
 class Element:
-    """Rows g and cost f of one element in z = [x0, (x, lam) per stage, u, h], x = [q, v, s]."""
+    """Rows g and cost f of one element in z = [x0, (x, lam) per stage, drift, u, h], x = [q, v, s].
+
+    Closed gaps are held by their rates, and discretised they drift by micrometres. `drift`, one
+    for each gap, moves the coordinates along its gradient so that it stays zero at the end
+    (Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12-13, 1985).
+    """
 
     z: ca.SX
     g: ca.SX
@@ -91,8 +97,9 @@ def element(
     reduction: Reduction,
     cost: Mapping[str, float | CostTerm],
     scheme: Scheme,
+    gaps: Sequence[ca.SX],
 ) -> Element:
-    """The collocation of one element."""
+    """The collocation of one element; `gaps`: of the node's coordinates, those that may close."""
     x0 = {g: scaled(layout, g, f"{g}0") for g in STATE}
     stages = [
         {g: scaled(layout, g, f"{g}{i + 1}") for g in (*STATE, "lam")} for i in range(scheme.stages)
@@ -101,7 +108,10 @@ def element(
     shared = {"u": u, "h": h_scaled}
     at = [node_vector(layout, {**stage, **shared}) for stage in stages]
     start = node_vector(layout, {**x0, **shared})
-    h = layout.half(start, "h")
+    h, read = layout.half(start, "h"), layout.reader(model.node, start)
+    drift = ca.SX.sym("drift", len(gaps))
+    normals = ca.jacobian(ca.vertcat(*(read(gap) for gap in gaps)) / SCALES["m"], x0["q"])
+    corrected = ca.mtimes(normals.T, drift)
 
     def slope(i: int, group: str, view: str) -> ca.SX:
         read = getattr(layout, view)
@@ -119,7 +129,8 @@ def element(
                 slope(i, "s", "full") / h, now["lam"], now["u"], ca.SX(0, 1),
             ]
         )  # fmt: skip
-        rows.append((slope(i, "q", "half") - h * layout.half(at[i], "v")) / ca.DM(q_scale))
+        moved = (slope(i, "q", "half") - h * layout.half(at[i], "v")) / ca.DM(q_scale)
+        rows.append(moved - corrected)
         labels += [f"kinematics:{c.name}" for c in layout.quantities["q"]]
         rows.append(project(model, reduction, dynamics) * h / STEP)
         labels += [f"dynamics:{c.name}" for c in layout.quantities["q"]]
@@ -135,7 +146,13 @@ def element(
         sum(w * running(model, cost, now, h) for w, now in zip(share, each, strict=True))
         / COST_SCALE
     )
-    parts = [*x0.values(), *(part for stage in stages for part in stage.values()), u, h_scaled]
+    parts = [
+        *x0.values(),
+        *(part for stage in stages for part in stage.values()),
+        drift,
+        u,
+        h_scaled,
+    ]
     return Element(ca.vertcat(*parts), ca.vertcat(*rows), ca.densify(ca.SX(f)), tuple(labels))
 
 

@@ -55,6 +55,8 @@ Order = list[tuple[tuple[int, ...], tuple[float, ...]]]  # modes and valves, pha
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
 UNFIT = "no order of its contacts and stops was found that holds"
 NEAREST, BEST, FINEST = range(3)  # steps of an elastic program
+FULL = 0.999  # of its longest duration: an element on its bound
+SEVERAL = 3  # elements of a phase, on average
 SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
@@ -132,10 +134,9 @@ class Refiner:
     seen: list[list[Phase]] = field(default_factory=list)  # phases that were tried
     solution: tuple[PhaseProgram, Iterate] | None = None  # by the finer scheme
 
-    @property
-    def marks(self) -> list[int]:
-        """Nodes at which the task asks for something: phases end there."""
-        return [w.node(len(self.plan) - 1) for w in self.requirements if w.at is not None]
+    def marks(self, nodes: int) -> list[int]:
+        """Those of `nodes` at which the task asks for something: phases end there."""
+        return [w.node(nodes) for w in self.requirements if w.at is not None]
 
     @property
     def left(self) -> int:
@@ -165,7 +166,14 @@ class Refiner:
         brief = LASTS if self.task.clearance else 0.0
         asked = stands(self.requirements, len(self.plan))
         return read_phases(
-            self.model, constraints, self.plan, valves, self.marks, trim, brief, asked
+            self.model,
+            constraints,
+            self.plan,
+            valves,
+            self.marks(len(self.plan) - 1),
+            trim,
+            brief,
+            asked,
         )
 
     def improved(self, found: Refined) -> Refined:
@@ -200,9 +208,10 @@ class Refiner:
                 if wrong:
                     found = replace(found, reason=UNFIT)
                     break
+                phases = self.evened(program, near)
             else:
-                return self.fine(program, near.Y)
-            better = repaired(program, wrong, self.marks)
+                return self.fine(program, near)
+            better = repaired(program, wrong, self.marks(program.nodes))
             if better is None:
                 break
             phases = better
@@ -229,62 +238,70 @@ class Refiner:
         found = self._solve(program, program.proximal(x, Refining.near), options)
         if not found.solved:
             return ended(program, found)
-        return self.simpler(program, found.Y) or self.finish(program, found.Y)
+        return self.simpler(program, found.Y) or self.finish(program, found)
 
     def simpler(self, program: PhaseProgram, x: np.ndarray) -> Refined | None:
         """The solution without the phases that collapsed in `x` (size,); None where there is
         none."""
-        phases = simplified(program, x, self.marks)
+        phases = simplified(program, x, self.marks(program.nodes))
         if phases is None or self.left <= 0:
             return None
         found = self.exact(phases, (program, x))
         return found if found.done else None
 
-    def finish(self, near: PhaseProgram, x: np.ndarray) -> Refined:
-        """An exact solution, from the nearest solution `x` (size,) with the coarser scheme
-        first."""
+    def finish(self, near: PhaseProgram, nearest: Iterate) -> Refined:
+        """An exact solution, from the nearest one with the coarser scheme first."""
         self.tell(Stage("phases: the best plan", 2, SOLVES))
-        program, start = self.build(self.evened(near, x), (near, x), RADAU3)
-        best = self._solve(program, start, rough(Refining.rough_iterations))
+        program, start = self.build(near.phases, self.plan, RADAU3)
+        best = self._solve(program, nearest.Y[: len(start)], rough(Refining.rough_iterations))
         found = ended(program, best)
         if best.solved:
             simpler = self.simpler(program, best.Y)
             if simpler is not None:
                 return simpler
-        ways = [(program, best.Y)] * best.solved + [(near, x)] * (not found.done)
-        for way in ways:
-            found = self.fine(*way)
+        for way in [best] * best.solved + [nearest] * (not found.done):
+            found = self.fine(program, way)
             if found.done:
                 break
         return found
 
-    def fine(self, coarser: PhaseProgram, x: np.ndarray) -> Refined:
-        """The exact program with the finer scheme, from a solution `x` (size,) with the coarser
-        one; with more stages where what holds at its nodes by the rates alone, such as a closed
-        contact, drifts further than the certificate allows."""
+    def fine(self, coarser: PhaseProgram, start: Iterate) -> Refined:
+        """The exact program with the finer scheme, from a solution with the coarser one; with
+        elements shared anew where a phase would last longer than its elements can, and with more
+        stages where it misses what the certificate allows."""
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
-        solution, made = self._by(RADAU5, coarser, x)
+        solution, made = self._by(RADAU5, coarser.phases, coarser, start)
+        phases = self.evened(*solution) if made.solved else coarser.phases
+        if phases != coarser.phases:
+            self.tell("phases: on elements shared by how long phases last")
+            even, better = self._by(RADAU5, phases, *solution)
+            if better.solved:
+                solution, made = even, better
         if made.solved and not self._keeps(made):
             self.tell("phases: with more stages in every element")
-            finest, better = self._by(RADAU9, solution[0], solution[1].Y)
+            finest, better = self._by(RADAU9, solution[0].phases, *solution)
             if self._keeps(better):
                 solution, made = finest, better
         if made.solved:
             self.solution = solution
         return made
 
-    def evened(self, program: PhaseProgram, x: np.ndarray) -> list[Phase]:
-        """The phases of a program with elements shared by how long they last in `x` (size,): one
-        read off a single node may last longer than its element can."""
-        each = zip(program.phases, x[program.columns.h[:, 0]], strict=True)
+    def evened(self, program: PhaseProgram, found: Iterate) -> list[Phase]:
+        """The phases of a program; where one of them lasts as long in a solution as its elements
+        can, on three elements a phase at least, shared by how long they last."""
+        h = program.columns.h[:, 0]
+        if not (found.Y[h] > FULL * program.upper[h]).any():
+            return program.phases
+        lasts = [p.elements * float(x) for p, x in zip(program.phases, found.Y[h], strict=True)]
+        nodes = max(program.nodes, SEVERAL * len(lasts))
         fractions = [w.at for w in self.requirements if w.at is not None]
-        lasts = [phase.elements * float(h) for phase, h in each]
-        return shared(program.phases, lasts, program.nodes, fractions) or program.phases
+        return shared(program.phases, lasts, nodes, fractions) or program.phases
 
-    def _by(self, scheme: Scheme, other: PhaseProgram, x: np.ndarray) -> tuple[Solution, Refined]:
-        """The exact program with a scheme, solved from a solution `x` (size,) of another one, its
-        elements shared by how long phases last there; where that fails, by proximal points."""
-        phases = self.evened(other, x)
+    def _by(
+        self, scheme: Scheme, phases: Sequence[Phase], other: PhaseProgram, start: Iterate
+    ) -> tuple[Solution, Refined]:
+        """The exact program of some phases with a scheme, from a solution of another one of the
+        same order; where that fails, by proximal points."""
 
         def make(near: PhaseProgram, x: np.ndarray) -> tuple[PhaseProgram, np.ndarray]:
             return self.build(phases, (near, x), scheme)
@@ -292,12 +309,12 @@ class Refiner:
         def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
             return self._solve(program, x, warm(Refining.rough_iterations))
 
-        program, start = make(other, x)
-        solution = program, solve(program, start)
+        program, x = make(other, start.Y)
+        solution = program, solve(program, x)
         ending = solution[1].ending
         if not solution[1].solved and not (ending and ending.cut_short):
             self.tell("phases: by steps that stay near the last plan")
-            solution = proximal_points(make, solve, other, x) or solution
+            solution = proximal_points(make, solve, other, start.Y) or solution
         return solution, read(*solution)
 
     def _keeps(self, found: Refined) -> bool:
