@@ -24,6 +24,7 @@ ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
 UNIT = 3.0
 TIME = "the time"
 WRONG = "(its unit is wrong)"
+ONE = "(the unit of one of them, or of several, is wrong)"
 SIZES = np.linspace(-9.0, 9.0, 25)  # logarithms of those that are tried first
 # within which speeds friction turns over, as shares of the model's: it tells no unit
 SHARP = np.geomspace(0.01, 30.0, 8)
@@ -102,6 +103,11 @@ class _Force:
         both = first, float(factors[len(free) - 1]) if TIME in units else first
         return float(left) / self.size(log), both
 
+    def hangs(self, log: RigLog) -> bool:
+        """Whether the model at rest needs another force at another position."""
+        rest = self._predicted(log, True)
+        return bool(np.ptp(rest) > 1e-6 * np.ptp(self._predicted(log)))
+
     def _predicted(self, log: RigLog, resting: bool = False) -> Array:
         """What the model predicts (k,); `resting`: of an axis that does not accelerate."""
         if (log, resting) not in self._seen:
@@ -154,8 +160,9 @@ def _other_units(
     log: RigLog, force: _Force, reversed_: str
 ) -> Iterator[tuple[Texts, RigLog, Units]]:
     """Channels in other units, in words, where every factor is one of units and each of them is
-    needed; of a cylinder only the force tells its own. The force may be `reversed_` as well."""
-    drive = not force.model.mechanism.bore
+    needed. Where no weight hangs on the position only the force tells a factor: of a cylinder its
+    own, of a drive that of all units together. The force may be `reversed_` as well."""
+    drive = not force.model.mechanism.bore and force.hangs(log)
     free: list[Units] = [(force.answer,), *([(TIME,), (force.answer, TIME)] if drive else [])]
     left: dict[tuple[float, Texts], float] = {}
     tried = {size: _stretched(log, size) for size in (0.0, *SIZES)} if drive else {0.0: log}
@@ -179,14 +186,22 @@ def _other_units(
             continue
         if not any(1.0 / UNIT < f < UNIT for f in found.values()):
             answer = {force.answer: sign * trial.channels.others[force.answer]}
-            texts = (reversed_,) * (sign < 0.0) + tuple(starmap(_wrong, found.items()))
+            said = tuple(starmap(_wrong, found.items()))
+            if not (drive or force.model.mechanism.bore):
+                asked = f"what {force.place} and {TIME} ask for"
+                said = (f"{force.answer} is about {_short(*found.values())} times {asked} {ONE}",)
+            texts = (reversed_,) * (sign < 0.0) + said
             yield texts, _moved(trial, 1.0, 0.0, trial.channels.others | answer), units
 
 
 def _wrong(name: str, factor: float) -> str:
     """A channel in another unit in words; by what `factor` it is too large."""
-    times = float(f"{max(factor, 1.0 / factor):.2g}")
-    return f"{name} is about {times:g} times too {'large' if factor > 1.0 else 'small'} {WRONG}"
+    times = _short(max(factor, 1.0 / factor))
+    return f"{name} is about {times} times too {'large' if factor > 1.0 else 'small'} {WRONG}"
+
+
+def _short(factor: float) -> str:
+    return f"{float(f'{factor:.2g}'):g}"
 
 
 def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]]]:
