@@ -186,11 +186,19 @@ def _other_units(
             continue
         if not any(1.0 / UNIT < f < UNIT for f in found.values()):
             answer = {force.answer: sign * trial.channels.others[force.answer]}
-            said = tuple(starmap(_wrong, found.items()))
-            if not (drive or force.model.mechanism.bore):
-                asked = f"what {force.place} and {TIME} ask for"
-                said = (f"{force.answer} is about {_short(*found.values())} times {asked} {ONE}",)
-            texts = (reversed_,) * (sign < 0.0) + said
+            alike = [force.place, TIME] if not (drive or force.model.mechanism.bore) else []
+            if place and force.answer in found:  # a weight that hardly turns tells their ratio
+                near = min(
+                    error(_stretched(log, size + by)) for by in (-np.log(UNIT), np.log(UNIT))
+                )
+                alike = [force.place] if near <= ALIKE * least else []
+            said: Texts = ()
+            if alike:
+                times = _short(found.pop(force.answer) / found.pop(force.place, 1.0))
+                said = (
+                    f"{force.answer} is about {times} times what suits {' and '.join(alike)} {ONE}",
+                )
+            texts = (reversed_,) * (sign < 0.0) + said + tuple(starmap(_wrong, found.items()))
             yield texts, _moved(trial, 1.0, 0.0, trial.channels.others | answer), units
 
 

@@ -113,10 +113,21 @@ def test_where_no_weight_hangs_on_the_position_no_unit_is_blamed_alone(
         log = Trajectory(factors[2] * TIME, columns, RUN | {"kind": "drive"})
         if factors == (1.0, 1.0, 1.0):
             assert rig_problem([log], model).validate() == []
-    said = rf"^log: axis/tau is about {words} what axis/q and the time ask for \(the unit of one"
+    said = rf"^log: axis/tau is about {words} what suits axis/q and the time \(the unit of one"
     with pytest.raises(BadData, match=said) as raised:
         rig_problem([log], model).validate()
     assert "; or " not in str(raised.value)
+
+
+def test_a_pendulum_that_hardly_turns_tells_position_and_torque_together() -> None:
+    """Degrees and pound-inches of a motion whose sine is straight: any two sizes in their ratio."""
+    right = pendulum(0.1 * Q, 0.0 * Q)
+    weight = (0.02 + 1.5 * 0.25**2) * 0.1 * A + 1.5 * 0.25 * 9.81 * np.sin(0.1 * Q)
+    torque = weight + 0.04 * np.tanh(0.1 * V / 0.01) + 0.1 * right["axis/tau"]
+    log = pendulum(np.degrees(right["axis/q"]), 8.85 * torque)
+    said = r"run: axis/tau is about 0\.15 times what suits axis/q \(the unit of one of them, or of"
+    with pytest.raises(BadData, match=said):
+        rig_problem([log], load_model("pendulum_rig")).validate()
 
 
 def test_a_cylinder() -> None:
