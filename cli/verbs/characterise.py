@@ -54,7 +54,7 @@ def characterise(
     """
     if not logs:
         raise typer.BadParameter("logs are missing: give CSV files", param_hint="LOGS")
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.model import load_model
 
     if load_model(model, rig=True).mechanism.rig:
@@ -70,7 +70,7 @@ def characterise(
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
-        fresh(out, force)
+        fresh(out, force, endings=YAML)
     folder = _folder(figure, figures, out)
     columns = load_map(column_map) if column_map else None
     read = {str(file): open_log(file, columns) for file in log_files(logs)}
@@ -119,13 +119,13 @@ def _own_rig(
     """The figures of a rig of the user's own, and of the effects that its model lists."""
     from rich.table import Table
 
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.identify.adopt import reference
     from kemba.identify.rigs.characterise import characterise_logs
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
-        fresh(out, force)
+        fresh(out, force, endings=YAML)
     found = characterise_logs(logs, model, column_map)
     if out:
         found.write_model(out, reference(model))

@@ -16,6 +16,7 @@ import numpy as np
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError, map_hint, suggest
+from kemba.folders import YAML
 from kemba.logs import times
 from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
 from kemba.logs.formats import READERS, UNREAD, check_read, reader
@@ -218,7 +219,6 @@ def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
 TEXTS = (".csv", ".txt", ".tsv", ".dat")
 BINARY = tuple(f".{ending}" for ending in READERS)
 ENDINGS = (*TEXTS, *BINARY, *(f".{ending}" for ending in " ".join(UNREAD).split()))
-YAML = (".yaml", ".yml")
 LONGEST = 200  # characters of another program's message
 
 

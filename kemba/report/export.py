@@ -7,6 +7,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.files import atomic_text
+from kemba.folders import ended
 from kemba.logs import ColumnMap, ColumnSource
 from kemba.logs.formats import MODULES, writer
 from kemba.quantity import convert
@@ -23,11 +24,8 @@ def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None =
     .mat and .npz: one array per column, in .mat as `front_hip_tau`, and `units`. Raises KembaError
     on other endings, and when a file cannot be written.
     """
-    path = Path(path)
+    path = ended(path, [f".{ending}" for ending in FORMATS])
     ending = path.suffix.lstrip(".").lower()
-    if ending not in FORMATS:
-        what = f"no format '{path.suffix}'" if path.suffix else "has no ending"
-        raise KembaError(str(path), what, f"one of .{', .'.join(FORMATS)} was expected")
     if columns is not None and ending != "csv":
         raise KembaError(str(path), "a column map goes with .csv only")
     if columns is not None:
