@@ -167,7 +167,8 @@ def as_numbers(cells: Column, decimal: str) -> tuple[Array, np.ndarray[Any, Any]
     import pandas as pd
 
     texts = pd.Series(cells).astype(str).str.strip().str.lower()
-    texts = texts.str.replace(",", ".", regex=False) if decimal == "," else texts
+    if decimal == ",":  # a point there parts thousands, and what it is in is no number
+        texts = texts.str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
     texts = texts.replace({"true": "1", "on": "1", "false": "0", "off": "0"})
     numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
     empty = texts.isin([text.lower() for text in MISSING]).to_numpy()

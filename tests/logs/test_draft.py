@@ -227,6 +227,15 @@ def test_a_mapped_cell_that_is_no_number_is_told(tmp_path: Path) -> None:
         read_log(path, load_map(tmp_path / "m.yaml"))
 
 
+def test_a_point_that_parts_thousands_is_no_decimal_sign(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t;x\n" + "".join(f"0,{i:03d};1.{i:03d}\n" for i in range(20)))
+    columns = {"time [s]": {"source": "t"}, "axis/q [m]": {"source": "x", "unit": "um"}}
+    layout = ColumnMap(separator=";", decimal=",", columns=columns)
+    with pytest.raises(KembaError, match=r"log.csv:2:2: x: '1.000' is not a number"):
+        read_log(path, layout)
+
+
 def test_the_page_lists_the_columns_that_a_log_needs() -> None:
     page = (Path(__file__).parents[2] / "docs/logs.md").read_text(encoding="utf-8")
     for targets in (robot_targets(("LEG",)), bench_targets()):

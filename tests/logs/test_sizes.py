@@ -12,6 +12,7 @@ from kemba.identify.logs.reading import read_log
 from kemba.logs import load_map
 from kemba.logs.draft.draft import Draft, draft_map
 from kemba.logs.draft.sizes import SIZES, _fits
+from kemba.logs.draft.words import named_unit
 
 DEGREES = np.degrees(1)
 
@@ -86,6 +87,20 @@ def test_sizes_tell_units(
     draft = drafted(tmp_path, **{name: (name, factor) for name, factor in changes.items()})
     assert expected.items() <= units(draft).items()
     assert draft.questions or "tau" in str(changes)
+
+
+def test_inches_and_centimetres_look_alike_and_are_asked_about(tmp_path: Path) -> None:
+    """Of an axis that may be as long as it likes."""
+    time = np.linspace(0.0, 4.0, 400)
+    table = {"time": time, "position": np.sin(time) * 0.17 / 0.0254, "force": np.cos(time)}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", (), None, "drive", {"axis/q": "m", "axis/tau": "N"})
+    assert [q.partition("taken as ")[2] for q in draft.questions] == ["in, but may be cm"]
+
+
+@pytest.mark.parametrize("unit", ["lbf", "kgf", "mNm", "um", "rev", "ft"])
+def test_units_behind_a_name(unit: str) -> None:
+    assert named_unit(f"front_{unit}") == ("front", unit)
 
 
 def test_pressures_in_megapascals(tmp_path: Path) -> None:

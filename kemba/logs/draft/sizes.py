@@ -26,7 +26,7 @@ SIZES = {
     "axis/q [rad]": (1.0, 0.0, 6.6),
 }
 UNITS = {
-    "m": ("m", "cm", "mm", "um"),
+    "m": ("m", "cm", "mm", "um", "in"),
     "rad": ("rad", "deg", "mrad"),
     "m.s-1": ("m.s-1", "cm.s-1", "mm.s-1"),
     "N.m": ("N.m", "mN.m"),
