@@ -299,6 +299,6 @@ def agreement(says: Meaning, target: Target) -> float:
         elif group not in target.means:
             score -= UNRELATED * (group in ("kind", "leg", "part"))
     other = "measured" if target.is_command else "desired"
-    if other in says.get("role", ()) and not target.is_valve:
+    if other in says.get("role", ()):
         score -= ASKED_FOR
     return score

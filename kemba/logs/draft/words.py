@@ -85,6 +85,7 @@ UNITS = (
     "kgf lbf Nm N.m mN.m mNm mV V"
 ).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
+SWITCHED = frozenset("extend retract ausfahren einfahren".split())  # what valves are told to do
 COUNTED = frozenset("counts cnt ticks pulses adc lsb".split())  # what a converter gave, no unit
 # of minutes, inches, per mille, and factors alone: `[1/100]`
 UNIT_MARK = re.compile(r"['\"′″‰]+|[\d\s.]*[/^]\s*-?\d+")
@@ -221,6 +222,8 @@ def meaning(name: str, legs: Sequence[str]) -> Meaning:
         found["kind"] = {"other"}
     if found.get("part", set()) & {"hip", "piston", "foot", "valve"}:
         _without_leg(found, said, legs)
+    if SWITCHED & set(said) and not {"part", "kind"} & found.keys():
+        found["part"] = {"valve"}
     if "valve" in found.get("part", ()) and len(found["part"]) > 1 and "u" in said:
         found["part"] -= {"valve"}
     return found
