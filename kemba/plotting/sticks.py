@@ -13,18 +13,8 @@ from matplotlib.lines import Line2D
 
 from kemba.errors import KembaError
 from kemba.folders import ended
-from kemba.plotting.source import CYLINDER, Machine, Pose, Source, poses
-from kemba.plotting.style import (
-    BLACK,
-    BLUE,
-    GREY,
-    INK,
-    MOVIES,
-    PURPLE,
-    SHADE,
-    VERMILLION,
-    paper_style,
-)
+from kemba.plotting.source import CYLINDER, MOVIES, Machine, Pose, Source, poses
+from kemba.plotting.style import BLACK, BLUE, GREY, INK, PURPLE, SHADE, VERMILLION, paper_style
 from kemba.scene import Scene
 from kemba.trajectory import Array
 

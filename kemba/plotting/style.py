@@ -31,7 +31,6 @@ COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 INK, GREY, SHADE = "#333333", "#8C8C8C", "#EBEBEB"
 DASHES = (0, (3.2, 1.4))
 FORMATS = (".png", ".pdf", ".svg")  # of figures
-MOVIES = (".gif", ".mp4")
 
 RC: Any = matplotlib.rc_params_from_file(
     Path(__file__).with_name("paper.mplstyle"), use_default_template=False

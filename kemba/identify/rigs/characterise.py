@@ -19,9 +19,7 @@ from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divi
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.reading import excerpts, read_logs
 from kemba.identify.problem.problem import Array, Problem
-from kemba.identify.rigs.problem import rig_problem
-from kemba.identify.rigs.vessel import vessel_problem
-from kemba.identify.workflow import model_of, posed
+from kemba.identify.workflow import make_problem, model_of, posed
 from kemba.logs import load_map, log_files
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
@@ -91,10 +89,9 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model, given: Problem) -> RigFit
     brought = {name.split(".")[0] for name in RIG_FIGURES}  # of these only the figures named
     listed = [name for name, (_, value) in started.parameters.items() if value]
     names = [n for n in listed if n in RIG_FIGURES or n.split(".")[0] not in brought]
-    make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]
-    problem: Problem = make(logs, started, dict.fromkeys(names, LOOSE))
+    problem = make_problem(logs, started, dict.fromkeys(names, LOOSE))
     # a slope of 1: a shape is known to its own size at 1 sigma
     seen = np.linalg.norm(problem.jacobian({}, names), axis=0) > 1.0
     shapes = {

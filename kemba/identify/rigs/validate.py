@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import product, starmap
 
 import numpy as np
@@ -14,6 +14,7 @@ from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, si
 from kemba.identify.problem.problem import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
+from kemba.units import short
 
 Gap = Callable[[RigLog], Array]  # the force of the model less that of the log, along a log
 Units = tuple[str, ...]  # channels in another unit
@@ -23,7 +24,6 @@ ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
 # metres, have 3.28
 UNIT = 3.0
 TIME = "the time"
-WRONG = "(its unit is wrong)"
 ONE = "(the unit of one of them, or of several, is wrong)"
 SIZES = np.linspace(-9.0, 9.0, 25)  # logarithms of those that are tried first
 # within which speeds friction turns over, as shares of the model's: it tells no unit
@@ -44,8 +44,6 @@ def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[Ke
         trials = {texts: force.left(trial, units) for texts, trial, units in mix_ups(log, force)}
         if simple := simplest(trials, small):
             said = "; or ".join(map(" and ".join, simple))
-            if sum(WRONG in texts[-1] for texts in simple) > 1:  # no weight tells them apart
-                said += "; or several of these are"
             what = "the force answers the motion so much better then"
             return [KembaError(log.name, said, what, hint)]
     if (work := force.work(log)) > POWER:
@@ -165,11 +163,7 @@ def _other_units(
     drive = not force.model.mechanism.bore and force.hangs(log)
     free: list[Units] = [(force.answer,), *([(TIME,), (force.answer, TIME)] if drive else [])]
     left: dict[tuple[float, Texts], float] = {}
-    tried = {size: _stretched(log, size) for size in (0.0, *SIZES)} if drive else {0.0: log}
-
-    def stretched(size: float) -> RigLog:
-        return tried[size] if size in tried else _stretched(log, size)
-
+    stretched = cache(partial(_stretched, log))
     places: list[Units] = [(), (force.place,)] if drive else [()]
     for sign, place, units in product((1.0, -1.0), places, [(), *free]):
         error = partial(force.left, units=units, sign=sign)
@@ -188,28 +182,22 @@ def _other_units(
             answer = {force.answer: sign * trial.channels.others[force.answer]}
             alike = [force.place, TIME] if not (drive or force.model.mechanism.bore) else []
             if place and force.answer in found:  # a weight that hardly turns tells their ratio
-                near = min(
-                    error(_stretched(log, size + by)) for by in (-np.log(UNIT), np.log(UNIT))
-                )
+                near = min(error(stretched(size + by)) for by in (-np.log(UNIT), np.log(UNIT)))
                 alike = [force.place] if near <= ALIKE * least else []
-            said: Texts = ()
+            texts = (reversed_,) * (sign < 0.0)
             if alike:
-                times = _short(found.pop(force.answer) / found.pop(force.place, 1.0))
-                said = (
-                    f"{force.answer} is about {times} times what suits {' and '.join(alike)} {ONE}",
-                )
-            texts = (reversed_,) * (sign < 0.0) + said + tuple(starmap(_wrong, found.items()))
+                times = short(found.pop(force.answer) / found.pop(force.place, 1.0))
+                suits = f"what suits {' and '.join(alike)} {ONE}"
+                texts += (f"{force.answer} is about {times} times {suits}",)
+            texts += tuple(starmap(_wrong, found.items()))
             yield texts, _moved(trial, 1.0, 0.0, trial.channels.others | answer), units
 
 
 def _wrong(name: str, factor: float) -> str:
     """A channel in another unit in words; by what `factor` it is too large."""
-    times = _short(max(factor, 1.0 / factor))
-    return f"{name} is about {times} times too {'large' if factor > 1.0 else 'small'} {WRONG}"
-
-
-def _short(factor: float) -> str:
-    return f"{float(f'{factor:.2g}'):g}"
+    times = short(max(factor, 1.0 / factor))
+    size = "large" if factor > 1.0 else "small"
+    return f"{name} is about {times} times too {size} (its unit is wrong)"
 
 
 def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]]]:

@@ -4,7 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ from kemba.logs.draft.words import (
     words,
 )
 from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
-from kemba.logs.text import cells_of, encoding, first_row, joined
+from kemba.logs.text import cells_of, first_row, joined, lines_of
 from kemba.trajectory import TIME, Array
 
 LINES = 300  # as many are looked at; a table that changes later is told when it is read
@@ -92,11 +92,7 @@ def units_below(path: Path, layout: Layout) -> list[str]:
 
 
 def _lines(path: Path) -> list[str]:
-    try:
-        with open(path, encoding=encoding(path), newline=None, errors="replace") as stream:
-            return [line.rstrip("\n") for line in islice(stream, LINES)]
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
+    return [line.rstrip("\n") for _, line in islice(lines_of(path), LINES)]
 
 
 def _numbers(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int]:
@@ -260,10 +256,7 @@ def _kind(
     if says("part", "valve"):
         return "bench", bench_targets()
     if says("kind", "pressure"):
-        return "cylinder", [
-            replace(target, needed=target.needed and (not target.is_valve))
-            for target in bench_targets()
-        ]
+        return "cylinder", [target for target in bench_targets() if not target.is_valve]
     return "drive", drive_targets(rotary=says("kind", "torque"))
 
 
@@ -314,14 +307,10 @@ def _share_level(
     columns: dict[str, dict[str, Any]], pairs: Mapping[str, str], values: Mapping[str, Array]
 ) -> None:
     """A valve that never switches in this log has the threshold of the others."""
-    level = next((s["threshold"] for s in columns.values() if "threshold" in s), None)
+    level = next(({"threshold": s["threshold"]} for s in columns.values() if "threshold" in s), {})
     for header, name in pairs.items():
-        if (
-            "valve/" in header
-            and level is not None
-            and np.nanmax(values[name]) == np.nanmin(values[name])
-        ):
-            columns[header]["threshold"] = level
+        if "valve/" in header and np.nanmax(values[name]) == np.nanmin(values[name]):
+            columns[header] |= level
 
 
 def _share_gauge(columns: dict[str, dict[str, Any]], pairs: Mapping[str, str]) -> list[str]:
