@@ -89,18 +89,29 @@ def test_sizes_tell_units(
     assert draft.questions or "tau" in str(changes)
 
 
-def test_inches_and_centimetres_look_alike_and_are_asked_about(tmp_path: Path) -> None:
-    """Of an axis that may be as long as it likes."""
+@pytest.mark.parametrize(
+    ("rig", "logged", "columns", "asked"),
+    [
+        ("drive", {"axis/q": "m", "axis/tau": "N"}, {"position": 6.7, "force": 3.0}, "in, but"),
+        ("vessel", {"vessel/P": "Pa", "vessel/T": "K"}, {"tank pressure": 7e5, "temp": 68.0},
+         "degF, but"),
+    ],
+)  # fmt: skip
+def test_inches_and_fahrenheit_are_asked_about(
+    rig: str, logged: dict[str, str], columns: dict[str, float], asked: str, tmp_path: Path
+) -> None:
+    """Beside centimetres and Celsius, in which the same numbers are usual too."""
     time = np.linspace(0.0, 4.0, 400)
-    table = {"time": time, "position": np.sin(time) * 0.17 / 0.0254, "force": np.cos(time)}
+    table = {"time": time, **{name: size * np.cos(0.3 * time) for name, size in columns.items()}}
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
-    draft = draft_map(tmp_path / "log.csv", (), None, "drive", {"axis/q": "m", "axis/tau": "N"})
-    assert [q.partition("taken as ")[2] for q in draft.questions] == ["in, but may be cm"]
+    (question,) = draft_map(tmp_path / "log.csv", (), None, rig, logged).questions
+    assert f"taken as {asked} may be" in question
 
 
-@pytest.mark.parametrize("unit", ["lbf", "kgf", "mNm", "um", "rev", "ft"])
+@pytest.mark.parametrize("unit", ["lbf", "kgf", "mNm", "um", "rev", "ft", "K"])
 def test_units_behind_a_name(unit: str) -> None:
     assert named_unit(f"front_{unit}") == ("front", unit)
+    assert named_unit("temp_C") == ("temp", "degC")
 
 
 def test_pressures_in_megapascals(tmp_path: Path) -> None:

@@ -78,11 +78,12 @@ ORDER = ("acceleration", "speed")  # a rate of a position is no position
 SPELT = {
     "degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg", "radians": "rad",
     "dps": "deg/s", "mps": "m/s", "meters": "m", "metres": "m", "seconds": "s", "newton": "N",
-    "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2", "Nmm": "N.mm",
+    "C": "degC", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2",
+    "Nmm": "N.mm",
 }  # fmt: skip
 UNITS = (
     "ns us µs ms s min um mm cm m in ft deg rad mrad rev turns gon bar mbar kPa MPa Pa psi kN N "
-    "kgf lbf Nm N.m mN.m mNm mV V"
+    "kgf lbf Nm N.m mN.m mNm mV V K degC"
 ).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
 SWITCHED = frozenset("extend retract ausfahren einfahren".split())  # what valves are told to do
