@@ -37,10 +37,14 @@ LARGEST = 95.0  # percentile of the rows that counts as the largest [%]
 
 def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` (k,) of the gap."""
-    force = _Force(model, sigma, gap)
+    force, drive = _Force(model, sigma, gap), not model.mechanism.bore
     small = SMALL * np.sqrt(len(sigma)) / force.size(log)
     hint = "correct it in a column map (--map), or the rig's figures in the model"
-    if force.left(log) >= small:
+    # a drive's force may have a zero, but a weight that is lifted tells up from down without one
+    for zero in (False, True) if drive and force.lifts(log) else (drive,):
+        force.zero = zero
+        if force.left(log) < small:
+            continue
         trials = {texts: force.left(trial, units) for texts, trial, units in mix_ups(log, force)}
         if simple := simplest(trials, small):
             said = "; or ".join(map(" and ".join, simple))
@@ -62,6 +66,7 @@ class _Force:
 
     def __init__(self, model: Model, sigma: Array, gap: Gap) -> None:
         self.model, self.sigma, self.gap = model, sigma, gap
+        self.zero = False  # whether the force that was read may have one
         self.place, self.answer = PLACE[model.mechanism.rig], ANSWER[model.mechanism.rig]
         self._seen: dict[tuple[RigLog, bool], Array] = {}
 
@@ -89,7 +94,7 @@ class _Force:
         side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
         known = [-side * np.tanh(log.speed / (sharp * still)) for sharp in SHARP]
         known += [-side * log.speed]
-        if not self.model.mechanism.bore:
+        if self.zero:
             known += [np.ones(len(self.sigma)), -np.ones(len(self.sigma))]
         force, rest = sign * self.read(log), self._predicted(log, TIME in units)
         moving = self._predicted(log) - rest
@@ -105,6 +110,10 @@ class _Force:
         """Whether the model at rest needs another force at another position."""
         rest = self._predicted(log, True)
         return bool(np.ptp(rest) > 1e-6 * np.ptp(self._predicted(log)))
+
+    def lifts(self, log: RigLog) -> bool:
+        """Whether it needs one, which is the same everywhere."""
+        return not self.hangs(log) and bool(np.any(self._predicted(log, True)))
 
     def _predicted(self, log: RigLog, resting: bool = False) -> Array:
         """What the model predicts (k,); `resting`: of an axis that does not accelerate."""

@@ -48,6 +48,7 @@ NUMBER = {
 }
 PISTONS = frozenset(WORDS["part"]["piston"].split()) - {"knee"}
 Layout = dict[str, Any]
+USUAL = {"separator": ",", "decimal": ".", "skip_rows": 0, "skip_below": 0, "header": 1}
 
 
 def layout_of(path: Path) -> Layout:
@@ -73,13 +74,10 @@ def layout_of(path: Path) -> Layout:
         expected = "rows of at least two numbers were expected"
         raise KembaError(str(path), "is no table that kemba recognises", expected)
     header, rows = _header(lines[:begin], separator, width)
-    layout: Layout = {} if separator == "," else {"separator": separator}
-    layout |= {} if decimal == "." else {"decimal": decimal}
-    above = header if rows else begin
     below = sum(bool(line.strip()) for line in lines[header + rows : begin]) if rows else 0
-    layout |= {"skip_rows": above} if above else {}
-    layout |= {"skip_below": below} if below else {}
-    return layout | ({} if rows == 1 else {"header": rows or False})
+    keys: Layout = {"separator": separator, "decimal": decimal, "skip_below": below}
+    keys |= {"skip_rows": header if rows else begin, "header": rows or False}
+    return {key: value for key, value in keys.items() if value != USUAL[key]}
 
 
 def units_below(path: Path, layout: Layout) -> list[str]:

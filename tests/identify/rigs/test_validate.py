@@ -119,6 +119,34 @@ def test_where_no_weight_hangs_on_the_position_no_unit_is_blamed_alone(
     assert "; or " not in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    ("sign", "turned", "zero", "words"),
+    [
+        (1, 1, 0.0, ""),
+        (1, 1, 20.0, ""),
+        (-1, -1, 0.0, "axis/q has the reversed sign and axis/tau has the reversed sign"),
+        (-1, 1, 0.0, "axis/q has the reversed sign"),
+        (1, -1, 0.0, "axis/tau has the reversed sign"),
+    ],
+)
+def test_a_weight_tells_up_from_down(
+    sign: int, turned: int, zero: float, words: str, tmp_path: Path
+) -> None:
+    """A zero of twice the weight would put an axis right that counts downwards; others stay."""
+    rig = {"kind": "drive", "inertia": "2 kg", "load": {"mass": "3 kg"}}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    force = 2.0 * A + 3.0 * (A + 9.81) + 3.0 * np.tanh(V / 0.01)
+    columns = {"axis/q [m]": sign * Q, "axis/tau [N]": turned * force + zero}
+    problem = rig_problem(
+        [Trajectory(TIME, columns, RUN | {"kind": "drive"})], load_model(tmp_path / "model.yaml")
+    )
+    if not words:
+        assert problem.validate() == []
+    else:
+        with pytest.raises(BadData, match=f"^log: {words}; the force answers"):
+            problem.validate()
+
+
 def test_a_pendulum_that_hardly_turns_tells_position_and_torque_together() -> None:
     """Degrees and pound-inches of a motion whose sine is straight: any two sizes in their ratio."""
     right = pendulum(0.1 * Q, 0.0 * Q)
