@@ -63,9 +63,8 @@ def place_for(
     beside it. With `force` files are replaced. Raises KembaError as `fresh` does; without
     `endings` that of `default` is asked for.
     """
-    if out is not None:
-        return fresh(out, force, endings=endings or (default.suffix,))
-    return fresh(default if force else next_free(default), force)
+    path = out or (default if force else next_free(default))
+    return fresh(path, force, endings=endings or (default.suffix,))
 
 
 def next_free(path: Path) -> Path:

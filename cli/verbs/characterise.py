@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,7 +64,10 @@ def characterise(
             raise typer.BadParameter(what, param_hint="--supply" if supply else "--figure")
         _own_rig(logs, model, out, force, json, quiet, column_map)
         return
-    from kemba.logs import load_map, log_files, open_log
+    from kemba.identify.logs.gate import BadData, sentence
+    from kemba.identify.logs.reading import read_logs
+    from kemba.identify.workflow import admitted, check_all, model_of
+    from kemba.logs import load_map, log_files
     from kemba.plant.characterise import characterise as fit
     from kemba.plant.published import as_json
     from kemba.quantity import to_si
@@ -73,12 +77,20 @@ def characterise(
         fresh(out, force, endings=YAML)
     folder = _folder(figure, figures, out)
     columns = load_map(column_map) if column_map else None
-    read = {str(file): open_log(file, columns) for file in log_files(logs)}
+    every = read_logs(log_files(logs), columns)
+    built, doubts = model_of(every, model), ()
+    check_all(every, built)
+    try:
+        admitted(every, built)
+    except BadData as error:  # of a cylinder that need not be as the model has it
+        doubts = (f"if this is the cylinder of {model}: {sentence(error.errors)}",)
+    read = {str(log.meta["path"]): log for log in every}
     try:
         supplies = [to_si(value, "Pa") for value in supply or []]
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--supply") from None
-    found = fit(read, load_model(model, rig=True).mechanism.need_cylinder(), supplies)
+    found = fit(read, built.mechanism.need_cylinder(), supplies)
+    found = replace(found, remarks=(*doubts, *found.remarks))
     if out:
         found.write_model(out, out.stem)
     drawn = _draw(found, read, folder, model) if folder else []
