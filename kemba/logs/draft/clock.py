@@ -29,13 +29,9 @@ NEAR = 15.0  # scores that differ by less do not decide between clocks that cont
 PLOTTER, NAMED, MENTIONED, BY_UNIT, UNNAMED, COUNTER = 100.0, 80.0, 60.0, 50.0, 10.0, 5.0
 SECONDS = frozenset("sec secs second seconds tv_sec s".split())
 PARTS = {
-    "ns": frozenset("nsec nsecs nanosec nanosecs nanosecond nanoseconds ns nano nanos".split()),
-    "us": frozenset(
-        "usec usecs microsec microsecs microsecond microseconds us micro micros".split()
-    ),
-    "ms": frozenset(
-        "msec msecs millisec millisecs millisecond milliseconds ms milli millis".split()
-    ),
+    "ns": "nsec nsecs nanosec nanosecs nanosecond nanoseconds ns nano nanos".split(),
+    "us": "usec usecs microsec microsecs microsecond microseconds us micro micros".split(),
+    "ms": "msec msecs millisec millisecs millisecond milliseconds ms milli millis".split(),
 }
 LARGEST = {"ns": 1e9, "us": 1e6, "ms": 1e3}
 COUNTERS = frozenset(
@@ -162,22 +158,20 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
     score, reason = called
     unit = stated or matching.time_unit(rows[np.isfinite(rows)])
     exact = raw[name] if raw[name].dtype.kind in "iu" else rows
-    begin = exact[np.argmax(np.isfinite(rows))]
-    seconds = convert(np.asarray(exact - begin, dtype=float), unit, "s")
-    from_first = abs(convert(float(rows[np.isfinite(rows)][0]), unit, "s")) > STAMPED
+    seconds = exact - exact[np.argmax(np.isfinite(rows))]
+    seconds = convert(np.asarray(seconds, dtype=float), unit, "s")
+    began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
     source = {"source": name, **({} if unit == "s" else {"unit": unit})}
     question = ""
     if stated is None:
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
         step = float(np.median(np.diff(np.unique(seconds[np.isfinite(seconds)]))))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
-        began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
         stamped = 6e8 < began < 4.1e9  # since 1970: between 1990 and 2100
         if not (first <= step <= last or stamped):
-            question = (
-                f"are the rows {1e3 * step:.3g} ms apart? '{name}' has no unit: taken as {unit}"
-            )
-    return Clock(score, source, (name,), seconds, from_first, reason, question)
+            apart = f"are the rows {1e3 * step:.3g} ms apart?"
+            question = f"{apart} '{name}' has no unit: taken as {unit}"
+    return Clock(score, source, (name,), seconds, abs(began) > STAMPED, reason, question)
 
 
 def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:

@@ -56,8 +56,7 @@ def layout_of(path: Path) -> Layout:
 
     Of all separators and decimal signs that give about the most numbers, one that gives a name to
     each column too, then one that is no blank, which stands in dates and names as well, and then
-    the one that gives most. Raises KembaError where none gives a table of
-    at least two columns.
+    the one that gives most. Raises KembaError where none gives a table of at least two columns.
     """
     lines = _lines(path)
     found = [(_numbers(lines, *way), way) for way in WAYS]

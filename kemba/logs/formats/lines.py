@@ -39,10 +39,9 @@ def read_lvm(path: Path) -> Recording:
 def _lvm_columns(
     own: dict[str, list[str]], header: list[str], table: np.ndarray, said: list[str]
 ) -> Recording:
-    units = own.get("Y_Unit_Label", [])
+    units = iter(own.get("Y_Unit_Label", []))
     names = numbered(header, len(header))
     columns: Raw = {}
-    channel = 0
     found: dict[str, str] = {}
     for name, values in zip(names, table.T, strict=True):
         if name.startswith("X_Value"):
@@ -50,9 +49,8 @@ def _lvm_columns(
                 columns["time"] = values
             continue
         columns[name] = values
-        if channel < len(units) and units[channel]:
-            found[name] = units[channel]
-        channel += 1
+        if unit := next(units, ""):
+            found[name] = unit
     if "time" not in columns and own.get("Delta_X"):
         start = float((own.get("X0") or ["0"])[0].replace(",", "."))
         step = float(own["Delta_X"][0].replace(",", "."))
