@@ -48,7 +48,7 @@ NUMBER = {
 }
 PISTONS = frozenset(WORDS["part"]["piston"].split()) - {"knee"}
 Layout = dict[str, Any]
-USUAL = {"separator": ",", "decimal": ".", "skip_rows": 0, "skip_below": 0, "header": 1}
+USUAL = {"separator": ",", "decimal": ".", "skip_rows": 0, "skip_below": 0, "header": 1}  # unsaid
 
 
 def layout_of(path: Path) -> Layout:
