@@ -23,14 +23,32 @@ MANY = 4  # log names that a command still lists one by one
 PROBE = 1_000_000  # bytes: about what a run folder takes, its solver's log included
 
 
-def fresh(path: str | Path, force: bool = False, option: str = "--out") -> Path:
-    """`path` for a new file, which can be written. Raises KembaError.
+YAML = (".yaml", ".yml")
+
+
+def ended(path: str | Path, endings: Sequence[str], option: str = "") -> Path:
+    """`path`, whose name ends in one of `endings`. Raises KembaError where it does not."""
+    path = Path(path)
+    if path.suffix.lower() not in endings:
+        what = f"no format '{path.suffix}'" if path.suffix else "has no ending"
+        known = " or ".join([", ".join(endings[:-1])] * (len(endings) > 1) + [endings[-1]])
+        raise KembaError(f"{option} {path}".strip(), what, f"a name ending in {known} was expected")
+    return path
+
+
+def fresh(
+    path: str | Path, force: bool = False, option: str = "--out", endings: Sequence[str] = ()
+) -> Path:
+    """`path` for a new file, which can be written, with one of `endings` where some are given.
+    Raises KembaError.
 
     A file that is there already is kept, unless `force`.
     """
     path = Path(path)
     if path.is_dir():
         raise KembaError(f"{option} {path}", "is a folder", "the name of a file was expected")
+    if endings:
+        ended(path, endings, option)
     if path.exists() and not force:
         hint = "give another name, or --force to replace it"
         raise KembaError(f"{option} {path}", "exists already", hint=hint)
@@ -38,13 +56,15 @@ def fresh(path: str | Path, force: bool = False, option: str = "--out") -> Path:
     return path
 
 
-def place_for(out: str | Path | None, default: Path, force: bool = False) -> Path:
+def place_for(
+    out: str | Path | None, default: Path, force: bool = False, endings: Sequence[str] = ()
+) -> Path:
     """Where a new file goes: to `out` when it is given, else to `default` or the next free name
-    beside it. With `force` files are replaced. Raises KembaError as `fresh` does.
+    beside it. With `force` files are replaced. Raises KembaError as `fresh` does; without
+    `endings` that of `default` is asked for.
     """
-    if out is not None:
-        return fresh(out, force)
-    return fresh(default if force else next_free(default), force)
+    path = out or (default if force else next_free(default))
+    return fresh(path, force, endings=endings or (default.suffix,))
 
 
 def next_free(path: Path) -> Path:

@@ -33,7 +33,7 @@ def adopt(
 
     Example: kemba-opt adopt answer --out model.yaml
     """
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.identify.adopt import adopt_answer, adopt_effect, adopted
     from kemba.model import load_model
     from kemba_cli.next_steps import after_model, say_next
@@ -45,7 +45,7 @@ def adopt(
     if effect is None and (nothing := adopted(answer, only_sure)):
         typer.echo(nothing, err=True)
         raise typer.Exit(BAD_ANSWER)
-    fresh(path, force)
+    fresh(path, force, endings=YAML)
     added = adopt_answer(answer, path, only_sure) if effect is None else effect
     if effect is not None:
         adopt_effect(answer, effect, path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,7 +55,7 @@ def characterise(
     """
     if not logs:
         raise typer.BadParameter("logs are missing: give CSV files", param_hint="LOGS")
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.model import load_model
 
     if load_model(model, rig=True).mechanism.rig:
@@ -63,22 +64,33 @@ def characterise(
             raise typer.BadParameter(what, param_hint="--supply" if supply else "--figure")
         _own_rig(logs, model, out, force, json, quiet, column_map)
         return
-    from kemba.logs import load_map, log_files, open_log
+    from kemba.identify.logs.gate import BadData, sentence
+    from kemba.identify.logs.reading import read_logs
+    from kemba.identify.workflow import admitted, check_all, model_of
+    from kemba.logs import load_map, log_files
     from kemba.plant.characterise import characterise as fit
     from kemba.plant.published import as_json
     from kemba.quantity import to_si
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
-        fresh(out, force)
+        fresh(out, force, endings=YAML)
     folder = _folder(figure, figures, out)
     columns = load_map(column_map) if column_map else None
-    read = {str(file): open_log(file, columns) for file in log_files(logs)}
+    every = read_logs(log_files(logs), columns)
+    built, doubts = model_of(every, model), ()
+    check_all(every, built)
+    try:
+        admitted(every, built)
+    except BadData as error:  # of a cylinder that need not be as the model has it
+        doubts = (f"if this is the cylinder of {model}: {sentence(error.errors)}",)
+    read = {str(log.meta["path"]): log for log in every}
     try:
         supplies = [to_si(value, "Pa") for value in supply or []]
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--supply") from None
-    found = fit(read, load_model(model, rig=True).mechanism.need_cylinder(), supplies)
+    found = fit(read, built.mechanism.need_cylinder(), supplies)
+    found = replace(found, remarks=(*doubts, *found.remarks))
     if out:
         found.write_model(out, out.stem)
     drawn = _draw(found, read, folder, model) if folder else []
@@ -119,13 +131,13 @@ def _own_rig(
     """The figures of a rig of the user's own, and of the effects that its model lists."""
     from rich.table import Table
 
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.identify.adopt import reference
     from kemba.identify.rigs.characterise import characterise_logs
     from kemba_cli.next_steps import after_model, say_next
 
     if out:
-        fresh(out, force)
+        fresh(out, force, endings=YAML)
     found = characterise_logs(logs, model, column_map)
     if out:
         found.write_model(out, reference(model))

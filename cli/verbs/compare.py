@@ -62,9 +62,9 @@ def compare(
         raise typer.BadParameter("--out names the figure", param_hint="--no-figure")
     path = None
     if figure or out is not None:
-        from kemba.plotting.style import figure_name
+        from kemba.plotting.style import FORMATS
 
-        path = figure_name(place_for(out, Path("compare.png"), force))
+        path = place_for(out, Path("compare.png"), force, FORMATS)
     logs = log_files(logs)
     with Progress(quiet or json, COMPARE) as progress:
         found, _ = compare_logs(logs, model, column_map, run, progress.tell)

@@ -46,13 +46,13 @@ def experiment(
 
     Example: kemba-opt experiment answer --out next.yaml
     """
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.identify.answer import read_answer
     from kemba_cli.next_steps import say_next
     from kemba_cli.progress import EXPERIMENT, Progress
 
     read_answer(answer)  # before a folder is made for the test
-    path = fresh(out or answer / "experiment.yaml", force)
+    path = fresh(out or answer / "experiment.yaml", force, endings=YAML)
     with Progress(quiet or json, EXPERIMENT) as progress:
         if on is Place.robot:
             facts = _on_robot(answer, path, certify, progress)

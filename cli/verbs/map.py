@@ -23,13 +23,13 @@ def draft_map(
     Example: kemba-opt map their_log.csv --out their_map.yaml
     """
     from kemba.files import atomic_text
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.logs.draft.draft import draft_map as draft
     from kemba.model import load_model
     from kemba_cli.next_steps import after_map, say_next
 
     out = out or Path(f"{log.stem}_map.yaml")
-    fresh(out, force)
+    fresh(out, force, endings=YAML)
     machine = load_model(model).mechanism
     stroke = None if machine.rig else machine.stroke
     found = draft(log, machine.legs, stroke, machine.rig, machine.logged)

@@ -44,13 +44,13 @@ def plot(
     from kemba.folders import fresh, next_free
     from kemba.logs import load_map
     from kemba.plotting import bench_logs, draw, load_sources, plot_rig
-    from kemba.plotting.source import default_path, machine_of
-    from kemba.plotting.style import open_window, save_figure, show_windows
+    from kemba.plotting.source import MOVIES, default_path, machine_of
+    from kemba.plotting.style import FORMATS, open_window, save_figure, show_windows
     from kemba_cli.next_steps import after_plot, say_next
 
-    for path, option in ((out, "--out"), (animate, "--animate")):
+    for path, option, endings in ((out, "--out", FORMATS), (animate, "--animate", MOVIES)):
         if path is not None:
-            fresh(path, force, option)
+            fresh(path, force, option, endings)
     runs = runs or [newest(quiet)]
     window = open_window() if show else None
     logs = bench_logs(runs[0]) if len(runs) == 1 else {}

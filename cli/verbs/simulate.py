@@ -79,7 +79,7 @@ def _run(
     policy: bool,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    from kemba.plant.repeat import kept, plant_of, repeat_run
+    from kemba.plant.repeat import outcome, plant_of, repeat_run
 
     plant = plant_of(source, model)
     play, fed_back = None, ""
@@ -91,13 +91,8 @@ def _run(
         play, fed_back = player_of(file, source), f"; {words_of(file)}"
     repeats = repeat_run(source, plant, out, repeat, noise, seed, play=play, tell=tell)
     runs = [r.summary for r in repeats]
-    apex = ", ".join(f"{r['apex_m']:.3f}" for r in runs)
-    sentence = f"reached {apex} m on {plant.name}"
-    if "landed" in runs[0]:
-        worst = max((abs(r["apex_error_m"]) for r in runs), default=0.0)
-        sentence += f", off the plan by at most {1e3 * worst:.0f} mm; {kept(repeats)}"
     facts = {"model": plant.name, "folder": str(out), "logs": [r["log"] for r in runs]}
-    return {**facts, "runs": runs, "sentence": f"{sentence}{fed_back}"}
+    return {**facts, "runs": runs, "sentence": f"{outcome(repeats, plant.name)}{fed_back}"}
 
 
 def _rig(rig: Rig, model: str, folder: Path, seed: int, noise: bool) -> dict[str, Any]:

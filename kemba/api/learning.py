@@ -138,14 +138,14 @@ def adopt(
     `answer`: what `discover` gave, or its folder. Raises KembaError where nothing was found or
     written, or `out` exists.
     """
-    from kemba.folders import fresh
+    from kemba.folders import YAML, fresh
     from kemba.identify.adopt import adopt_answer, adopt_effect
 
     folder = answer.folder if isinstance(answer, Discovered) else answer
     if folder is None:
         hint = 'kemba.discover(logs, out="answer")'
         raise KembaError("the answer", "was not written to a folder", hint=hint)
-    path = fresh(out)
+    path = fresh(out, endings=YAML)
     if effect is None:
         adopt_answer(folder, path)
     else:

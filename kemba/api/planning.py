@@ -24,7 +24,7 @@ from kemba.model import load_model as load
 from kemba.model.spec import model_files
 from kemba.ocp import Task
 from kemba.ocp import load_task as load_with_document
-from kemba.plant.repeat import Repeat, kept, plant_of, repeat_run
+from kemba.plant.repeat import Repeat, outcome, plant_of, repeat_run
 from kemba.report.solving import solve_into
 from kemba.runs import Run, RunFolder, load_run
 from kemba.solve import Approach, Listener
@@ -212,8 +212,7 @@ class Executions(Result):
     @property
     def sentence(self) -> str:
         """What was reached, in words."""
-        apex = ", ".join(f"{repeat.summary['apex_m']:.3f}" for repeat in self.repeats)
-        return f"reached {apex} m on {self.plant}; {kept(self.repeats)}"
+        return outcome(self.repeats, self.plant)
 
     def figure(self) -> Figure:
         """Plan and executions on one sheet."""

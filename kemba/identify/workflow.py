@@ -265,8 +265,11 @@ def check_log(
     return logs[0], posed(logs, model)[1]
 
 
-def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
-    """The problem of explaining bench or robot logs with a model."""
+def make_problem(
+    logs: Sequence[Trajectory], model: Model, figures: Mapping[str, float] | None = None
+) -> Problem:
+    """The problem of explaining logs with a model; of a rig of the user's own `figures` are more
+    that may be scaled, with 1 sigma of their factors."""
     if logs[0].meta["kind"] == "bench":
         from kemba.identify.bench.problem import bench_problem
 
@@ -274,11 +277,11 @@ def make_problem(logs: Sequence[Trajectory], model: Model) -> Problem:
     if model.mechanism.rig == "vessel":
         from kemba.identify.rigs.vessel import vessel_problem
 
-        return vessel_problem(logs, model)
+        return vessel_problem(logs, model, figures)
     if model.mechanism.rig:
         from kemba.identify.rigs.problem import rig_problem
 
-        return rig_problem(logs, model)
+        return rig_problem(logs, model, figures)
     from kemba.identify.robot.problem import robot_problem
 
     return robot_problem(logs, model)

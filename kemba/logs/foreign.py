@@ -16,6 +16,7 @@ import numpy as np
 
 from kemba.config import load_yaml
 from kemba.errors import KembaError, map_hint, suggest
+from kemba.folders import YAML
 from kemba.logs import times
 from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
 from kemba.logs.formats import READERS, UNREAD, check_read, reader
@@ -40,9 +41,9 @@ def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
             continue
         values, own = reader.values(header, source), reader.own_time(source, time)
         if source.unwrap:
-            turned = unwrapped(values)
-            said.append(f"{header}: {_turns(values, turned)}")
-            values = turned
+            before, values = values, unwrapped(values)
+            turns = np.abs(np.diff((values - before)[np.isfinite(values)])) > 1e-9
+            said.append(f"{header}: begins anew {np.count_nonzero(turns)} times: joined")
         hold = times.is_command(header)
         if own is not None:
             values = times.placed(time, own, values, hold)
@@ -73,11 +74,6 @@ def wraps(values: Array) -> bool:
     far = leaps[leaps > 0.5 * turn]
     within = np.ptp(known) < 1.1 * turn if len(known) else False
     return bool(within and len(far) and np.all(far > 0.75 * turn) and np.all(far < 1.1 * turn))
-
-
-def _turns(before: Array, after: Array) -> str:
-    count = np.count_nonzero(np.abs(np.diff((after - before)[np.isfinite(after)])) > 1e-9)
-    return f"begins anew {count} times: joined"
 
 
 def _unit(header: str) -> str:
@@ -218,7 +214,6 @@ def _earlier(time: Array, values: Array, delay: float, hold: bool) -> Array:
 TEXTS = (".csv", ".txt", ".tsv", ".dat")
 BINARY = tuple(f".{ending}" for ending in READERS)
 ENDINGS = (*TEXTS, *BINARY, *(f".{ending}" for ending in " ".join(UNREAD).split()))
-YAML = (".yaml", ".yml")
 LONGEST = 200  # characters of another program's message
 
 

@@ -108,7 +108,7 @@ def _header(path: Path, layout: ColumnMap) -> tuple[int, list[str]]:
     header joined by `/`."""
     rows, taken = list[list[str]](), layout.skip_rows
     wanted = int(layout.header) + layout.skip_below
-    for number, line in _lines(path):
+    for number, line in lines_of(path):
         if number <= layout.skip_rows or not line.strip():
             continue
         if len(rows) == wanted:
@@ -127,7 +127,8 @@ def joined(rows: Sequence[Sequence[str]]) -> list[str]:
     return ["/".join(filter(None, parts)) for parts in zip(*filled, strict=True)]
 
 
-def _lines(path: Path) -> Iterator[tuple[int, str]]:
+def lines_of(path: Path) -> Iterator[tuple[int, str]]:
+    """The lines of a text, numbered from 1. Raises KembaError where it cannot be read."""
     try:
         with open(path, encoding=encoding(path), newline=None, errors="replace") as stream:
             yield from enumerate(stream, start=1)
@@ -167,7 +168,8 @@ def as_numbers(cells: Column, decimal: str) -> tuple[Array, np.ndarray[Any, Any]
     import pandas as pd
 
     texts = pd.Series(cells).astype(str).str.strip().str.lower()
-    texts = texts.str.replace(",", ".", regex=False) if decimal == "," else texts
+    if decimal == ",":  # a point there parts thousands, and what it is in is no number
+        texts = texts.str.replace(".", "?", regex=False).str.replace(",", ".", regex=False)
     texts = texts.replace({"true": "1", "on": "1", "false": "0", "off": "0"})
     numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=float, copy=True)
     empty = texts.isin([text.lower() for text in MISSING]).to_numpy()

@@ -20,6 +20,7 @@ from kemba.errors import KembaError
 from kemba.mechanism import load_robot
 from kemba.model import Model, build_model, load_model, load_spec
 from kemba.model.spec import ModelSpec, changed_effects, own_robot
+from kemba.ocp.certificate.status import moved
 from kemba.plant.certificate import PLANT
 from kemba.plant.commands import scattered
 from kemba.plant.controller import Execution, execute, read_controller
@@ -188,11 +189,20 @@ class Repeat:
         return facts | (self.replay.summary() if self.replay else {})
 
 
-def kept(repeats: Sequence[Repeat]) -> str:
-    """How many of some executions keep the end of their plan: `2 of 3 landed`."""
+def outcome(repeats: Sequence[Repeat], plant: str) -> str:
+    """What executions on `plant` reached, how far they were off their plan, and how many of them
+    keep its end, in words."""
+    facts = dict.fromkeys(", ".join(moved(repeat.execution.trajectory)) for repeat in repeats)
+    text = f"reached {'; '.join(facts)} on {plant}"
     found = [repeat.replay for repeat in repeats if repeat.replay]
-    does = "stayed upright" if any(one.end for one in found) else "landed"
-    return f"{sum(one.landed for one in found)} of {len(repeats)} {does}"
+    if not found:
+        return text
+    worst = 1e3 * max(abs(one.apex_error_m) for one in found)
+    ends = [abs(one.end.velocity_m_s) for one in found if one.end]
+    last = f" at the apex and {max(ends):.2f} m/s at the end" if ends else ""
+    does = "stayed upright" if ends else "landed"
+    keep = f"{sum(one.landed for one in found)} of {len(repeats)} {does}"
+    return f"{text}, off the plan by at most {worst:.0f} mm{last}; {keep}"
 
 
 def repeat_run(

@@ -35,7 +35,7 @@ from kemba.quantity import to_si
 from kemba.scene import FLAT, Scene, scene_in
 from kemba.trajectory import Array, Trajectory
 
-PLAN_FILE = "trajectory.csv"
+PLAN_FILE, MOVIES = "trajectory.csv", (".gif", ".mp4")
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 HIDDEN = ("controller", "simulation")  # file names that need their folder to be clear

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from kemba.errors import KembaError
-from kemba.plotting.source import CYLINDER, Machine, Pose, Source, poses
+from kemba.folders import ended
+from kemba.plotting.source import CYLINDER, MOVIES, Machine, Pose, Source, poses
 from kemba.plotting.style import BLACK, BLUE, GREY, INK, PURPLE, SHADE, VERMILLION, paper_style
 from kemba.scene import Scene
 from kemba.trajectory import Array
@@ -222,12 +223,8 @@ def _stage(shown: list[Pose], machine: Machine) -> tuple[Figure, StickFigure]:
 
 
 def _writer(path: Path) -> AbstractMovieWriter:
-    ending = path.suffix.lower()
-    if ending == ".gif":
+    if ended(path, MOVIES).suffix.lower() == ".gif":
         return PillowWriter(fps=RATE)
-    if ending != ".mp4":
-        what = f"no animation format '{ending}'" if ending else "has no ending"
-        raise KembaError(str(path), what, "a name ending in .gif or .mp4 was expected")
     if not FFMpegWriter.isAvailable():
         hint = f"install ffmpeg, or write a GIF: --animate {path.with_suffix('.gif')}"
         raise KembaError(str(path), "MP4 needs the program ffmpeg, which is not here", hint=hint)

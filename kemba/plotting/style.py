@@ -17,6 +17,7 @@ from matplotlib.lines import Line2D
 
 from kemba.errors import KembaError
 from kemba.files import atomic_path
+from kemba.folders import ended
 from kemba.plotting.source import Source
 
 WIDTH = 7.0  # in, both columns of a paper
@@ -29,7 +30,7 @@ BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK = (
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK)
 INK, GREY, SHADE = "#333333", "#8C8C8C", "#EBEBEB"
 DASHES = (0, (3.2, 1.4))
-FORMATS = ("png", "pdf", "svg")
+FORMATS = (".png", ".pdf", ".svg")  # of figures
 
 RC: Any = matplotlib.rc_params_from_file(
     Path(__file__).with_name("paper.mplstyle"), use_default_template=False
@@ -50,18 +51,9 @@ def paper_figure(height: float, width: float = WIDTH, figure: Figure | None = No
     return figure
 
 
-def figure_name(path: str | Path) -> Path:
-    """`path`, whose ending is a format of figures. Raises KembaError where it is not."""
-    path = Path(path)
-    if path.suffix.lstrip(".").lower() not in FORMATS:
-        what = f"no figure format '{path.suffix}'" if path.suffix else "has no ending"
-        raise KembaError(str(path), what, "a name ending in .png, .pdf or .svg was expected")
-    return path
-
-
 def save_figure(figure: Figure, path: str | Path) -> Path:
     """Write the figure as PNG, PDF or SVG by the ending of `path`. Raises KembaError."""
-    path = figure_name(path)
+    path = ended(path, FORMATS)
     with atomic_path(path) as temporary, matplotlib.rc_context(RC):
         if path.suffix.lower() == ".png":
             _lay_out(figure)

@@ -7,12 +7,13 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.files import atomic_text
+from kemba.folders import ended
 from kemba.logs import ColumnMap, ColumnSource
 from kemba.logs.formats import MODULES, writer
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
 
-FORMATS = ("csv", *MODULES)
+FORMATS = (".csv", *(f".{ending}" for ending in MODULES))
 
 
 def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None = None) -> Path:
@@ -23,16 +24,13 @@ def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None =
     .mat and .npz: one array per column, in .mat as `front_hip_tau`, and `units`. Raises KembaError
     on other endings, and when a file cannot be written.
     """
-    path = Path(path)
-    ending = path.suffix.lstrip(".").lower()
-    if ending not in FORMATS:
-        what = f"no format '{path.suffix}'" if path.suffix else "has no ending"
-        raise KembaError(str(path), what, f"one of .{', .'.join(FORMATS)} was expected")
-    if columns is not None and ending != "csv":
+    path = ended(path, FORMATS)
+    text = path.suffix.lower() == ".csv"
+    if columns is not None and not text:
         raise KembaError(str(path), "a column map goes with .csv only")
     if columns is not None:
         _foreign(trajectory, path, columns)
-    elif ending == "csv":
+    elif text:
         trajectory.write(path)
     else:
         writer(path)(trajectory, path)

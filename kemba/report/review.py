@@ -257,9 +257,11 @@ def review(
     being done. The page needs no other file. Raises KembaError where a file cannot be read or
     written, or nothing is given.
     """
+    if not logs and run is None and answer is None:
+        raise KembaError("", "nothing to review", "logs, --run or --answer was expected")
+    path = place_for(out, default_path(logs, run, answer), force)
     given = gather_material(logs, run, answer, model, column_map, tell)
     tell("drawing")
-    path = place_for(out, default_path(logs, run, answer), force)
     try:
         title, body, verdict = page_of(given)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -298,8 +300,6 @@ def gather_material(
     tell: Tell = silent,
 ) -> Material:
     """Read everything; the comparison of the logs included. Raises KembaError."""
-    if not logs and run is None and answer is None:
-        raise KembaError("", "nothing to review", "logs, --run or --answer was expected")
     found = load_run(run) if run is not None else None
     task: Any = load_yaml(found.task).data if found else {}
     asked = task if isinstance(task, dict) else {}

@@ -14,7 +14,7 @@ import numpy as np
 import kemba
 from kemba.errors import KembaError
 from kemba.files import atomic_path, atomic_text
-from kemba.folders import fresh, place_for
+from kemba.folders import ended, fresh, place_for
 from kemba.logs import load_map
 from kemba.plotting.source import CYLINDER, Pose, Source, load_source, machine_of, poses
 from kemba.report.charts import script_text
@@ -164,7 +164,7 @@ def record_run(
 ) -> Path:
     """The same as `write_rerun` of a run folder or a log, with the arguments of `view_run`."""
     source, ghost = shown(run, column_map, plan)
-    return write_rerun(source, fresh(out, force, "--rerun"), model, ghost)
+    return write_rerun(source, fresh(out, force, "--rerun", [ENDING]), model, ghost)
 
 
 def write_rerun(
@@ -176,10 +176,7 @@ def write_rerun(
     Raises KembaError where rerun-sdk is not installed, columns are missing or the file cannot be
     written.
     """
-    path = Path(path)
-    if path.suffix != ENDING:
-        raise KembaError(str(path), "is no name of a recording of Rerun", f"'NAME{ENDING}' was "
-                         "expected")  # fmt: skip
+    path = ended(path, [ENDING])
     try:
         import rerun as rr
     except ImportError:

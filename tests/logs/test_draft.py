@@ -159,6 +159,19 @@ def test_a_drive_is_recognised(tmp_path: Path) -> None:
     assert list(draft.columns) == ["time [s]", "axis/q [m]", "axis/tau [N]"]
 
 
+def test_valves_are_told_by_what_they_are_told_to_do(tmp_path: Path) -> None:
+    """Of a command and its echo, the command counts."""
+    t = np.arange(200) * 1e-3
+    table = {"time": t, "displacement_mm": 30 + 20 * np.sin(9 * t), "load_cell": 50 * np.cos(9 * t)}
+    for i, side in enumerate(("extend", "retract")):
+        table[f"{side}_cmd"] = (t * 1e3 % 50 < 20 + 9 * i).astype(float)
+        table[f"{side}_fb"] = np.roll(table[f"{side}_cmd"], 6)
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", LEGS, 0.07)
+    assert draft.kind == "bench" and not draft.questions + draft.missing
+    assert draft.columns["valve/retract [1]"]["source"] == "retract_cmd"
+
+
 def test_our_own_names_need_no_guess(tmp_path: Path) -> None:
     log = foreign_files.robot_log()
     log.write(tmp_path / "log.csv")
@@ -225,6 +238,15 @@ def test_a_mapped_cell_that_is_no_number_is_told(tmp_path: Path) -> None:
     )
     with pytest.raises(KembaError, match=r"a.csv:3:2: x: 'oops' is not a number"):
         read_log(path, load_map(tmp_path / "m.yaml"))
+
+
+def test_a_point_that_parts_thousands_is_no_decimal_sign(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t;x\n" + "".join(f"0,{i:03d};1.{i:03d}\n" for i in range(20)))
+    columns = {"time [s]": {"source": "t"}, "axis/q [m]": {"source": "x", "unit": "um"}}
+    layout = ColumnMap(separator=";", decimal=",", columns=columns)
+    with pytest.raises(KembaError, match=r"log.csv:2:2: x: '1.000' is not a number"):
+        read_log(path, layout)
 
 
 def test_the_page_lists_the_columns_that_a_log_needs() -> None:

@@ -12,6 +12,7 @@ from kemba.identify.logs.reading import read_log
 from kemba.logs import load_map
 from kemba.logs.draft.draft import Draft, draft_map
 from kemba.logs.draft.sizes import SIZES, _fits
+from kemba.logs.draft.words import named_unit
 
 DEGREES = np.degrees(1)
 
@@ -86,6 +87,31 @@ def test_sizes_tell_units(
     draft = drafted(tmp_path, **{name: (name, factor) for name, factor in changes.items()})
     assert expected.items() <= units(draft).items()
     assert draft.questions or "tau" in str(changes)
+
+
+@pytest.mark.parametrize(
+    ("rig", "logged", "columns", "asked"),
+    [
+        ("drive", {"axis/q": "m", "axis/tau": "N"}, {"position": 6.7, "force": 3.0}, "in, but"),
+        ("vessel", {"vessel/P": "Pa", "vessel/T": "K"}, {"tank pressure": 7e5, "temp": 68.0},
+         "degF, but"),
+    ],
+)  # fmt: skip
+def test_inches_and_fahrenheit_are_asked_about(
+    rig: str, logged: dict[str, str], columns: dict[str, float], asked: str, tmp_path: Path
+) -> None:
+    """Beside centimetres and Celsius, in which the same numbers are usual too."""
+    time = np.linspace(0.0, 4.0, 400)
+    table = {"time": time, **{name: size * np.cos(0.3 * time) for name, size in columns.items()}}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    (question,) = draft_map(tmp_path / "log.csv", (), None, rig, logged).questions
+    assert f"taken as {asked} may be" in question
+
+
+@pytest.mark.parametrize("unit", ["lbf", "kgf", "mNm", "um", "rev", "ft", "K"])
+def test_units_behind_a_name(unit: str) -> None:
+    assert named_unit(f"front_{unit}") == ("front", unit)
+    assert named_unit("temp_C") == ("temp", "degC")
 
 
 def test_pressures_in_megapascals(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from kemba.errors import KembaError
 from kemba.identify.logs.reading import read_log
 from kemba.logs import ColumnMap, load_map
 from kemba.logs.draft.draft import draft_map
-from kemba.logs.formats.arrays import read_json
+from kemba.logs.formats import reader
 from kemba.logs.times import seconds
 from kemba.trajectory import Trajectory
 
@@ -146,6 +146,7 @@ def test_two_columns_that_fit_as_well_are_a_question(
     ("name", "words"),
     [
         ("front_hip_q [counts]", "which is no unit that is known"),
+        ("front_hip_q_counts", "is in 'counts', which is no unit that is known"),
         ("front_hip_q_des", "which column is measured"),
     ],
 )
@@ -252,9 +253,9 @@ def test_json_of_rows_is_read(form: str, tmp_path: Path) -> None:
     rows = [{"time": 1e-3 * i, "hip": {"q": None if i == 3 else 0.1 * i}} for i in range(80)]
     rows[5]["note"] = "here"  # type: ignore[assignment]
     texts = [json.dumps(row) for row in rows]
-    path = tmp_path / "log.json"
+    path = tmp_path / ("log.jsonl" if form == "lines" else "log.json")
     path.write_text("\n".join(texts) if form == "lines" else f"[{', '.join(texts)}]")
-    found = read_json(path)
+    found = reader(path)(path)
     q = found.columns["hip/q"]
     assert np.isnan(q[3]) and q[4] == pytest.approx(0.4) and len(q) == 80
 

@@ -199,7 +199,7 @@ def test_formats(plan: Source, tmp_path_factory: pytest.TempPathFactory) -> None
     figure = draw([Source("z", plan.trajectory.select(["body/z"]))])
     for name in ("a.png", "new/a.pdf", "a.svg"):
         assert save_figure(figure, folder / name).stat().st_size > 1000
-    with pytest.raises(KembaError, match=r"no figure format '.jpeg2'; a name ending in .png"):
+    with pytest.raises(KembaError, match=r"no format '.jpeg2'; a name ending in .png"):
         save_figure(figure, folder / "a.jpeg2")
     with pytest.raises(KembaError, match="has no ending"):
         save_figure(figure, folder / "a")

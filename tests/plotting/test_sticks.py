@@ -71,7 +71,7 @@ def test_other_formats(
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
     with pytest.raises(KembaError, match=r"needs the program ffmpeg.*GIF: --animate .*jump.gif"):
         save_animation(plan, machine, tmp_path / "jump.mp4")
-    with pytest.raises(KembaError, match=r"no animation format '.avi'; .* .gif or .mp4"):
+    with pytest.raises(KembaError, match=r"no format '.avi'; .* .gif or .mp4"):
         save_animation(plan, machine, tmp_path / "jump.avi")
 
 

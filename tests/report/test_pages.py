@@ -153,7 +153,7 @@ def test_wrong_endings_are_told(run: Path, tmp_path: Path) -> None:
     done = call("export", str(run), "--out", str(tmp_path / "plan.xls"))
     assert done.exit_code == 2
     assert (
-        "no format '.xls'; one of .csv, .parquet, .mcap, .mat, .npz, .json was expected"
+        "no format '.xls'; a name ending in .csv, .parquet, .mcap, .mat, .npz or .json was"
         in done.stderr
     )
     done = call("export", str(run), "--out", str(tmp_path / "a.mat"), "--map", "authors.yaml")

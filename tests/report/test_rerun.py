@@ -24,7 +24,7 @@ def test_without_its_package_the_way_out_is_said(
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(KembaError, match=r"'rerun-sdk', which is not installed.*kemba\[rerun\]"):
         write_rerun(Source("log", motion()), tmp_path / "a.rrd")
-    with pytest.raises(KembaError, match="no name of a recording"):
+    with pytest.raises(KembaError, match=r"no format .\.html.; a name ending in \.rrd was"):
         write_rerun(Source("log", motion()), tmp_path / "a.html")
     assert not list(tmp_path.iterdir())
 

@@ -15,7 +15,7 @@ LOOP = {
         "next: kemba-opt simulate run-# --repeat # --noise",
     ),
     "kemba-opt simulate run-1 --repeat 3 --noise --out logs-1": (
-        "reached #, #, # m on plant, off the plan by at most # mm; # of # landed",
+        " m on plant, off the plan by at most # mm; # of # landed",
     ),
     "kemba-opt review logs-1/*.csv --run run-1": (
         "The robot reaches # m, # mm below the plan, and stays upright; the model does not explain "
@@ -28,7 +28,7 @@ LOOP = {
         "m), planned are # m.",
     ),
     "kemba-opt simulate run-2 --repeat 3 --noise --out logs-2": (
-        "reached #, #, # m on plant, off the plan by at most # mm; # of # landed",
+        " m on plant, off the plan by at most # mm; # of # landed",
     ),
 }
 

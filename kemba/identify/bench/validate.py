@@ -34,6 +34,7 @@ SWAPPED = "valve/extend and valve/retract are swapped"
 INVERTED = "valve/extend and valve/retract are inverted (1 is on)"
 MOVED = "piston/F counts from another zero"
 REVERSED = "piston/F has the reversed sign (pushing is positive)"
+SUPPLIES = (0.7, 1.4)  # gauge pressure of a log over that of the model, least and largest
 FULL = 1.1  # share of the stroke that a position may read
 Texts = tuple[str, ...]  # mistakes
 Left = dict[Texts, float]  # the share of the force's spread that is left without them
@@ -44,11 +45,9 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
     as_read, force = _left(run, predict), run.measured["piston/F"][run.keep["piston/F"]]
     if not as_read or as_read[()] < (small := SMALL * run.sigma["piston/F"] / _spread(force)):
         return []
-    trials = {more: (run, more, left) for more, left in as_read.items()}
-    trials |= {
+    trials = {
         some + more: (trial, more, left)
         for some, trial in mix_ups(run, stroke)
-        if some
         for more, left in _left(trial, predict).items()
     }
     simple = simplest({texts: left for texts, (_, _, left) in trials.items()}, small)
@@ -123,6 +122,10 @@ def mix_ups(run: BenchLog, stroke: float) -> Iterator[tuple[Texts, BenchLog]]:
 def _left(run: BenchLog, predict: Predict) -> Left:
     """What may be wrong with the force, and what is left without; {} where nothing is predicted."""
     force, found = run.measured["piston/F"][run.keep["piston/F"]], {}
+    edges = [edge for sent in run.commands for pulse in sent for edge in pulse]
+    first, last = run.motion.time[[0, -1]]
+    switched = any(first < edge < last for edge in edges)
+    supplies = SUPPLIES if switched else (1.0, 1.0)  # a level alone tells none
     with np.errstate(over="ignore", invalid="ignore"):  # a mix-up may lead anywhere
         try:
             predicted = predict(run)[run.keep["piston/F"]]
@@ -130,12 +133,19 @@ def _left(run: BenchLog, predict: Predict) -> Left:
             return {}
         for sign, (unit, factor) in product((1.0, -1.0), UNITS.items()):
             texts = (REVERSED,) * (sign < 0.0) + (f"piston/F seems to be in {unit}",) * bool(unit)
-            gap, spread = predicted - sign * factor * force, _spread(factor * force)
-            found[texts] = rms(gap) / spread
+            told, spread = sign * factor * force, _spread(factor * force)
+            found[texts] = rms(_gap(predicted, told, supplies)) / spread
+            gap = _gap(predicted, told, supplies, 1.0)
             moved = f"`{'sign: -1, ' * (sign < 0.0)}offset: {np.mean(gap):+.3g} N`"
             zero = (*texts, f"{MOVED} ({moved})")
             found[zero] = float(np.std(gap)) / max(factor * float(np.std(force)), 1.0)
     return {texts: left for texts, left in found.items() if np.isfinite(left)}
+
+
+def _gap(predicted: Array, told: Array, supplies: tuple[float, float], zero: float = 0.0) -> Array:
+    """Predicted less told force (n,) at the supply that suits best; `zero` 1 of any zero, or 0."""
+    x, y = predicted - zero * predicted.mean(), told - zero * told.mean()
+    return np.asarray(np.clip(x @ y / max(x @ x, 1.0), *supplies) * predicted - told)
 
 
 def _spread(force: Array) -> float:

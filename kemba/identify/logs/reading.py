@@ -22,7 +22,7 @@ from kemba.trajectory import Array, Trajectory, sidecar
 class GateSettings:
     """When a log is refused."""
 
-    shortest = 0.15  # a log must last at least so long [s]
+    shortest = 0.05  # a log must last at least so long [s]: a fast stroke lasts 0.08
     fewest = 60  # a log must have at least so many rows
     # largest median distance of rows [s]: 50 rows a second; chambers of Table I need 8 to 37 ms to
     # fill

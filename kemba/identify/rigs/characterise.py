@@ -17,13 +17,10 @@ from kemba.effects.base import Effect
 from kemba.errors import KembaError
 from kemba.identify.infer.joint import RIG_FIGURES, conflicts_between_runs, divisions, half_widths
 from kemba.identify.infer.windows import rms
-from kemba.identify.logs.gate import check_logs
-from kemba.identify.logs.reading import excerpts, read_logs, taken_on
+from kemba.identify.logs.reading import excerpts, read_logs
 from kemba.identify.problem.problem import Array, Problem
-from kemba.identify.rigs.problem import rig_problem
-from kemba.identify.rigs.vessel import vessel_problem
+from kemba.identify.workflow import make_problem, model_of, posed
 from kemba.logs import load_map, log_files
-from kemba.model import load_model
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -80,8 +77,9 @@ class RigFit:
         dump_yaml({"name": path.stem, "base": base, "effects": effects, "notes": notes}, path)
 
 
-def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
-    """Fit all figures that the model lists and that show. Raises KembaError."""
+def _fit_rig(logs: Sequence[Trajectory], model: Model, given: Problem) -> RigFit:
+    """Fit all figures that the model lists and that show; `given`: the problem before. Raises
+    KembaError."""
     effects = []
     for effect in model.effects:  # a switch that stands at off starts at its usual size
         sizes = effect.parameters()
@@ -91,20 +89,18 @@ def _fit_rig(logs: Sequence[Trajectory], model: Model) -> RigFit:
     brought = {name.split(".")[0] for name in RIG_FIGURES}  # of these only the figures named
     listed = [name for name, (_, value) in started.parameters.items() if value]
     names = [n for n in listed if n in RIG_FIGURES or n.split(".")[0] not in brought]
-    make = vessel_problem if model.mechanism.rig == "vessel" else rig_problem
     if "measured_chambers.gain" not in names and model.mechanism.rig == "cylinder":
         names = ["measured_chambers.gain", *names]
-    problem: Problem = make(logs, started, dict.fromkeys(names, LOOSE))
+    problem = make_problem(logs, started, dict.fromkeys(names, LOOSE))
     # a slope of 1: a shape is known to its own size at 1 sigma
     seen = np.linalg.norm(problem.jacobian({}, names), axis=0) > 1.0
     shapes = {
         f"{e.name}.{n}" for e in started.effects if e.off for n in e.parameters().keys() - e.off
     }
     names = [n for n, shows in zip(names, seen, strict=True) if shows or n not in shapes]
-    before: Problem = make(logs, model)
     values = {n: float(started.effect(n.rsplit(".", 1)[0]).value(n.rsplit(".", 1)[1]))
               for n in names}  # fmt: skip
-    return _fit(problem, names, values, model, rms(before.residual({})))
+    return _fit(problem, names, values, model, rms(given.residual({})))
 
 
 def _fit(
@@ -174,10 +170,8 @@ def characterise_logs(
 ) -> RigFit:
     """The figures of the rig of `model`, and of its effects, from logs (or folders of them).
 
-    Raises KembaError; BadData where the logs cannot be right.
+    Raises KembaError; BadData where the logs cannot be right, as `compare` says it.
     """
     read = read_logs(log_files(logs), load_map(column_map) if column_map else None)
-    built = load_model(model)
-    taken_on(read, built.mechanism)
-    check_logs(read)
-    return _fit_rig(excerpts(read)[0], built)
+    given, _ = posed(read, model)
+    return _fit_rig(excerpts(read)[0], model_of(read, model), given)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from itertools import product, starmap
 
 import numpy as np
@@ -14,6 +14,7 @@ from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, si
 from kemba.identify.problem.problem import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
+from kemba.units import short
 
 Gap = Callable[[RigLog], Array]  # the force of the model less that of the log, along a log
 Units = tuple[str, ...]  # channels in another unit
@@ -23,7 +24,7 @@ ZEROS = np.linspace(-np.pi, np.pi, 25)  # those that are tried first [rad]
 # metres, have 3.28
 UNIT = 3.0
 TIME = "the time"
-WRONG = "(its unit is wrong)"
+ONE = "(the unit of one of them, or of several, is wrong)"
 SIZES = np.linspace(-9.0, 9.0, 25)  # logarithms of those that are tried first
 # within which speeds friction turns over, as shares of the model's: it tells no unit
 SHARP = np.geomspace(0.01, 30.0, 8)
@@ -36,15 +37,17 @@ LARGEST = 95.0  # percentile of the rows that counts as the largest [%]
 
 def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[KembaError]:
     """What must be wrong with a log's columns, if anything; `sigma` (k,) of the gap."""
-    force = _Force(model, sigma, gap)
+    force, drive = _Force(model, sigma, gap), not model.mechanism.bore
     small = SMALL * np.sqrt(len(sigma)) / force.size(log)
     hint = "correct it in a column map (--map), or the rig's figures in the model"
-    if force.left(log) >= small:
+    # a drive's force may have a zero, but a weight that is lifted tells up from down without one
+    for zero in (False, True) if drive and force.lifts(log) else (drive,):
+        force.zero = zero
+        if force.left(log) < small:
+            continue
         trials = {texts: force.left(trial, units) for texts, trial, units in mix_ups(log, force)}
         if simple := simplest(trials, small):
             said = "; or ".join(map(" and ".join, simple))
-            if sum(WRONG in texts[-1] for texts in simple) > 1:  # no weight tells them apart
-                said += "; or several of these are"
             what = "the force answers the motion so much better then"
             return [KembaError(log.name, said, what, hint)]
     if (work := force.work(log)) > POWER:
@@ -63,6 +66,7 @@ class _Force:
 
     def __init__(self, model: Model, sigma: Array, gap: Gap) -> None:
         self.model, self.sigma, self.gap = model, sigma, gap
+        self.zero = False  # whether the force that was read may have one
         self.place, self.answer = PLACE[model.mechanism.rig], ANSWER[model.mechanism.rig]
         self._seen: dict[tuple[RigLog, bool], Array] = {}
 
@@ -90,7 +94,7 @@ class _Force:
         side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
         known = [-side * np.tanh(log.speed / (sharp * still)) for sharp in SHARP]
         known += [-side * log.speed]
-        if not self.model.mechanism.bore:
+        if self.zero:
             known += [np.ones(len(self.sigma)), -np.ones(len(self.sigma))]
         force, rest = sign * self.read(log), self._predicted(log, TIME in units)
         moving = self._predicted(log) - rest
@@ -101,6 +105,15 @@ class _Force:
         first = float(factors[0]) if self.answer in units else 1.0
         both = first, float(factors[len(free) - 1]) if TIME in units else first
         return float(left) / self.size(log), both
+
+    def hangs(self, log: RigLog) -> bool:
+        """Whether the model at rest needs another force at another position."""
+        rest = self._predicted(log, True)
+        return bool(np.ptp(rest) > 1e-6 * np.ptp(self._predicted(log)))
+
+    def lifts(self, log: RigLog) -> bool:
+        """Whether it needs one, which is the same everywhere."""
+        return not self.hangs(log) and bool(np.any(self._predicted(log, True)))
 
     def _predicted(self, log: RigLog, resting: bool = False) -> Array:
         """What the model predicts (k,); `resting`: of an axis that does not accelerate."""
@@ -154,15 +167,12 @@ def _other_units(
     log: RigLog, force: _Force, reversed_: str
 ) -> Iterator[tuple[Texts, RigLog, Units]]:
     """Channels in other units, in words, where every factor is one of units and each of them is
-    needed; of a cylinder only the force tells its own. The force may be `reversed_` as well."""
-    drive = not force.model.mechanism.bore
+    needed. Where no weight hangs on the position only the force tells a factor: of a cylinder its
+    own, of a drive that of all units together. The force may be `reversed_` as well."""
+    drive = not force.model.mechanism.bore and force.hangs(log)
     free: list[Units] = [(force.answer,), *([(TIME,), (force.answer, TIME)] if drive else [])]
     left: dict[tuple[float, Texts], float] = {}
-    tried = {size: _stretched(log, size) for size in (0.0, *SIZES)} if drive else {0.0: log}
-
-    def stretched(size: float) -> RigLog:
-        return tried[size] if size in tried else _stretched(log, size)
-
+    stretched = cache(partial(_stretched, log))
     places: list[Units] = [(), (force.place,)] if drive else [()]
     for sign, place, units in product((1.0, -1.0), places, [(), *free]):
         error = partial(force.left, units=units, sign=sign)
@@ -179,14 +189,24 @@ def _other_units(
             continue
         if not any(1.0 / UNIT < f < UNIT for f in found.values()):
             answer = {force.answer: sign * trial.channels.others[force.answer]}
-            texts = (reversed_,) * (sign < 0.0) + tuple(starmap(_wrong, found.items()))
+            alike = [force.place, TIME] if not (drive or force.model.mechanism.bore) else []
+            if place and force.answer in found:  # a weight that hardly turns tells their ratio
+                near = min(error(stretched(size + by)) for by in (-np.log(UNIT), np.log(UNIT)))
+                alike = [force.place] if near <= ALIKE * least else []
+            texts = (reversed_,) * (sign < 0.0)
+            if alike:
+                times = short(found.pop(force.answer) / found.pop(force.place, 1.0))
+                suits = f"what suits {' and '.join(alike)} {ONE}"
+                texts += (f"{force.answer} is about {times} times {suits}",)
+            texts += tuple(starmap(_wrong, found.items()))
             yield texts, _moved(trial, 1.0, 0.0, trial.channels.others | answer), units
 
 
 def _wrong(name: str, factor: float) -> str:
     """A channel in another unit in words; by what `factor` it is too large."""
-    times = float(f"{max(factor, 1.0 / factor):.2g}")
-    return f"{name} is about {times:g} times too {'large' if factor > 1.0 else 'small'} {WRONG}"
+    times = short(max(factor, 1.0 / factor))
+    size = "large" if factor > 1.0 else "small"
+    return f"{name} is about {times} times too {size} (its unit is wrong)"
 
 
 def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]]]:

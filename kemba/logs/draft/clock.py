@@ -29,13 +29,9 @@ NEAR = 15.0  # scores that differ by less do not decide between clocks that cont
 PLOTTER, NAMED, MENTIONED, BY_UNIT, UNNAMED, COUNTER = 100.0, 80.0, 60.0, 50.0, 10.0, 5.0
 SECONDS = frozenset("sec secs second seconds tv_sec s".split())
 PARTS = {
-    "ns": frozenset("nsec nsecs nanosec nanosecs nanosecond nanoseconds ns nano nanos".split()),
-    "us": frozenset(
-        "usec usecs microsec microsecs microsecond microseconds us micro micros".split()
-    ),
-    "ms": frozenset(
-        "msec msecs millisec millisecs millisecond milliseconds ms milli millis".split()
-    ),
+    "ns": "nsec nsecs nanosec nanosecs nanosecond nanoseconds ns nano nanos".split(),
+    "us": "usec usecs microsec microsecs microsecond microseconds us micro micros".split(),
+    "ms": "msec msecs millisec millisecs millisecond milliseconds ms milli millis".split(),
 }
 LARGEST = {"ns": 1e9, "us": 1e6, "ms": 1e3}
 COUNTERS = frozenset(
@@ -85,10 +81,8 @@ def switches(raw: Raw) -> set[str]:
     """The columns that say `on` and `off`, or `true` and `false`."""
     said = {"on", "off", "true", "false"}
     found = {name for name, cells in raw.items() if cells.dtype == bool}
-    texts = {name: cells for name, cells in raw.items() if cells.dtype == object}
-    return found | {
-        n for n, cells in texts.items() if {str(c).strip().lower() for c in cells} <= said
-    }
+    texts = [(name, cells) for name, cells in raw.items() if cells.dtype == object]
+    return found | {n for n, cells in texts if {str(c).strip().lower() for c in cells} <= said}
 
 
 def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | None:
@@ -122,11 +116,8 @@ def joint_state_labels(raw: Raw) -> dict[str, str]:
     """Names for the columns of `ros2 topic echo --csv` of a JointState: stamp, frame, the joints'
     names, then their positions, velocities and efforts. Empty where the columns are others."""
     texts = {name: cells for name, cells in raw.items() if cells.dtype == object and len(cells)}
-    constant = [
-        n
-        for n, cells in texts.items()
-        if len(set(cells)) == 1 and any(map(str.isalpha, str(cells[0])))
-    ]
+    alike = [(name, str(cells[0])) for name, cells in texts.items() if len(set(cells)) == 1]
+    constant = [name for name, cell in alike if any(map(str.isalpha, cell))]
     joints = [str(raw[name][0]) for name in constant if name.isdigit() and int(name) > 3]
     after = [name for name in raw if name.isdigit() and int(name) > 3 + len(joints)]
     if not joints or len(after) < len(joints):
@@ -158,9 +149,8 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
         score = NAMED if says_time(name) else MENTIONED
         return Clock(score, {"source": name}, (name,), read, False, f"'{name}' holds clock times")
     rows = values[name]
-    if not _rises(rows, says_time(name) or stated is not None) or (
-        stated is not None and not _is_time(stated)
-    ):
+    sure = says_time(name) or stated is not None
+    if not _rises(rows, sure) or not matching.converts(stated, "s"):
         return None
     called = _called(name, rows, stated, names)
     if called is None:
@@ -168,22 +158,20 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
     score, reason = called
     unit = stated or matching.time_unit(rows[np.isfinite(rows)])
     exact = raw[name] if raw[name].dtype.kind in "iu" else rows
-    begin = exact[np.argmax(np.isfinite(rows))]
-    seconds = convert(np.asarray(exact - begin, dtype=float), unit, "s")
-    from_first = abs(convert(float(rows[np.isfinite(rows)][0]), unit, "s")) > STAMPED
+    seconds = exact - exact[np.argmax(np.isfinite(rows))]
+    seconds = convert(np.asarray(seconds, dtype=float), unit, "s")
+    began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
     source = {"source": name, **({} if unit == "s" else {"unit": unit})}
     question = ""
     if stated is None:
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
         step = float(np.median(np.diff(np.unique(seconds[np.isfinite(seconds)]))))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
-        began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
         stamped = 6e8 < began < 4.1e9  # since 1970: between 1990 and 2100
         if not (first <= step <= last or stamped):
-            question = (
-                f"are the rows {1e3 * step:.3g} ms apart? '{name}' has no unit: taken as {unit}"
-            )
-    return Clock(score, source, (name,), seconds, from_first, reason, question)
+            apart = f"are the rows {1e3 * step:.3g} ms apart?"
+            question = f"{apart} '{name}' has no unit: taken as {unit}"
+    return Clock(score, source, (name,), seconds, abs(began) > STAMPED, reason, question)
 
 
 def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:
@@ -268,14 +256,6 @@ def _agree(a: Clock, b: Clock) -> bool:
     return bool(abs(spans[0] - spans[1]) <= ALIKE * max(spans))
 
 
-def _is_time(unit: str) -> bool:
-    try:
-        convert(1.0, unit, "s")
-    except ValueError:
-        return False
-    return True
-
-
 def _rises(values: Array, named: bool = True) -> bool:
     """Whether a column rises; one that is called a time may repeat, as where each topic has rows of
     its own."""
@@ -283,6 +263,5 @@ def _rises(values: Array, named: bool = True) -> bool:
     if not len(steps):
         return False
     rising = np.mean(steps > 0)
-    return bool(
-        rising > RISING or (named and rising > REPEATED and np.mean(steps < 0) < 1 - RISING)
-    )
+    often = named and rising > REPEATED and np.mean(steps < 0) < 1 - RISING
+    return bool(rising > RISING or often)

@@ -4,7 +4,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,7 @@ from kemba.logs.draft.words import (
     words,
 )
 from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
-from kemba.logs.text import cells_of, encoding, first_row, joined
+from kemba.logs.text import cells_of, first_row, joined, lines_of
 from kemba.trajectory import TIME, Array
 
 LINES = 300  # as many are looked at; a table that changes later is told when it is read
@@ -48,6 +48,7 @@ NUMBER = {
 }
 PISTONS = frozenset(WORDS["part"]["piston"].split()) - {"knee"}
 Layout = dict[str, Any]
+USUAL = {"separator": ",", "decimal": ".", "skip_rows": 0, "skip_below": 0, "header": 1}  # unsaid
 
 
 def layout_of(path: Path) -> Layout:
@@ -55,8 +56,7 @@ def layout_of(path: Path) -> Layout:
 
     Of all separators and decimal signs that give about the most numbers, one that gives a name to
     each column too, then one that is no blank, which stands in dates and names as well, and then
-    the one that gives most. Raises KembaError where none gives a table of
-    at least two columns.
+    the one that gives most. Raises KembaError where none gives a table of at least two columns.
     """
     lines = _lines(path)
     found = [(_numbers(lines, *way), way) for way in WAYS]
@@ -73,13 +73,10 @@ def layout_of(path: Path) -> Layout:
         expected = "rows of at least two numbers were expected"
         raise KembaError(str(path), "is no table that kemba recognises", expected)
     header, rows = _header(lines[:begin], separator, width)
-    layout: Layout = {} if separator == "," else {"separator": separator}
-    layout |= {} if decimal == "." else {"decimal": decimal}
-    above = header if rows else begin
     below = sum(bool(line.strip()) for line in lines[header + rows : begin]) if rows else 0
-    layout |= {"skip_rows": above} if above else {}
-    layout |= {"skip_below": below} if below else {}
-    return layout | ({} if rows == 1 else {"header": rows or False})
+    keys: Layout = {"separator": separator, "decimal": decimal, "skip_below": below}
+    keys |= {"skip_rows": header if rows else begin, "header": rows or False}
+    return {key: value for key, value in keys.items() if value != USUAL[key]}
 
 
 def units_below(path: Path, layout: Layout) -> list[str]:
@@ -92,11 +89,7 @@ def units_below(path: Path, layout: Layout) -> list[str]:
 
 
 def _lines(path: Path) -> list[str]:
-    try:
-        with open(path, encoding=encoding(path), newline=None, errors="replace") as stream:
-            return [line.rstrip("\n") for line in islice(stream, LINES)]
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
+    return [line.rstrip("\n") for _, line in islice(lines_of(path), LINES)]
 
 
 def _numbers(lines: list[str], separator: str, decimal: str) -> tuple[int, int, int]:
@@ -260,10 +253,7 @@ def _kind(
     if says("part", "valve"):
         return "bench", bench_targets()
     if says("kind", "pressure"):
-        return "cylinder", [
-            replace(target, needed=target.needed and (not target.is_valve))
-            for target in bench_targets()
-        ]
+        return "cylinder", [target for target in bench_targets() if not target.is_valve]
     return "drive", drive_targets(rotary=says("kind", "torque"))
 
 
@@ -314,14 +304,10 @@ def _share_level(
     columns: dict[str, dict[str, Any]], pairs: Mapping[str, str], values: Mapping[str, Array]
 ) -> None:
     """A valve that never switches in this log has the threshold of the others."""
-    level = next((s["threshold"] for s in columns.values() if "threshold" in s), None)
+    level = next(({"threshold": s["threshold"]} for s in columns.values() if "threshold" in s), {})
     for header, name in pairs.items():
-        if (
-            "valve/" in header
-            and level is not None
-            and np.nanmax(values[name]) == np.nanmin(values[name])
-        ):
-            columns[header]["threshold"] = level
+        if "valve/" in header and np.nanmax(values[name]) == np.nanmin(values[name]):
+            columns[header] |= level
 
 
 def _share_gauge(columns: dict[str, dict[str, Any]], pairs: Mapping[str, str]) -> list[str]:

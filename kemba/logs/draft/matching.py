@@ -239,12 +239,13 @@ def _best(scores: np.ndarray[Any, Any]) -> tuple[float, dict[int, int]]:
 
 def fits(target: Target, unit: str | None, values: Array) -> bool:
     """Whether a column's unit and values (n,) can be those of a target."""
-    if target.is_valve:
-        return two_levels(values)
-    if unit is None:
-        return True
+    return two_levels(values) if target.is_valve else converts(unit, target.unit)
+
+
+def converts(unit: str | None, ours: str) -> bool:
+    """Whether what has this unit can be in ours; what has none may be."""
     try:
-        convert(1.0, unit, target.unit)
+        convert(1.0, unit or ours, ours)
     except ValueError:
         return False
     return True
@@ -299,6 +300,6 @@ def agreement(says: Meaning, target: Target) -> float:
         elif group not in target.means:
             score -= UNRELATED * (group in ("kind", "leg", "part"))
     other = "measured" if target.is_command else "desired"
-    if other in says.get("role", ()) and not target.is_valve:
+    if other in says.get("role", ()):
         score -= ASKED_FOR
     return score

@@ -26,12 +26,12 @@ SIZES = {
     "axis/q [rad]": (1.0, 0.0, 6.6),
 }
 UNITS = {
-    "m": ("m", "cm", "mm", "um"),
+    "m": ("m", "cm", "mm", "um", "in"),
     "rad": ("rad", "deg", "mrad"),
     "m.s-1": ("m.s-1", "cm.s-1", "mm.s-1"),
     "N.m": ("N.m", "mN.m"),
     "Pa": ("Pa", "mbar", "kPa", "psi", "bar", "MPa"),
-    "K": ("K", "degC"),
+    "K": ("K", "degC", "degF"),
 }
 ANY = (1.0, 0.0, np.inf)  # SI, whatever its size
 STROKES = (0.03, 4.0)  # shares of a known stroke between which the largest reading may lie

@@ -78,12 +78,16 @@ ORDER = ("acceleration", "speed")  # a rate of a position is no position
 SPELT = {
     "degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg", "radians": "rad",
     "dps": "deg/s", "mps": "m/s", "meters": "m", "metres": "m", "seconds": "s", "newton": "N",
-    "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2", "Nmm": "N.mm",
+    "C": "degC", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2",
+    "Nmm": "N.mm",
 }  # fmt: skip
 UNITS = (
-    "ns us µs ms s min mm cm m in deg rad mrad bar mbar kPa MPa Pa psi kN N Nm N.m mN.m mV V"
+    "ns us µs ms s min um mm cm m in ft deg rad mrad rev turns gon bar mbar kPa MPa Pa psi kN N "
+    "kgf lbf Nm N.m mN.m mNm mV V K degC"
 ).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
+SWITCHED = frozenset("extend retract ausfahren einfahren".split())  # what valves are told to do
+COUNTED = frozenset("counts cnt ticks pulses adc lsb".split())  # what a converter gave, no unit
 # of minutes, inches, per mille, and factors alone: `[1/100]`
 UNIT_MARK = re.compile(r"['\"′″‰]+|[\d\s.]*[/^]\s*-?\d+")
 LEGS_IN_BRACKETS = frozenset("L R F B H A".split())  # `(L)` is the left one, not litres
@@ -182,7 +186,9 @@ def is_unit(text: str, indexed: bool = False) -> bool:
 
 
 def strange_unit(name: str, legs: Sequence[str]) -> str | None:
-    """What stands in brackets like a unit and is none that is known: `[counts]`."""
+    """What stands like a unit and is none that is known: `pos [foo]`, `pos_counts`."""
+    if (last := words(name)[-1:]) and last[0] in COUNTED:
+        return last[0]
     for match in BRACKETS.finditer(name):
         text = (match[1] or match[2] or "").strip()
         marked = bool(UNIT_MARK.fullmatch(text))
@@ -217,6 +223,8 @@ def meaning(name: str, legs: Sequence[str]) -> Meaning:
         found["kind"] = {"other"}
     if found.get("part", set()) & {"hip", "piston", "foot", "valve"}:
         _without_leg(found, said, legs)
+    if SWITCHED & set(said) and not {"part", "kind"} & found.keys():
+        found["part"] = {"valve"}
     if "valve" in found.get("part", ()) and len(found["part"]) > 1 and "u" in said:
         found["part"] -= {"valve"}
     return found

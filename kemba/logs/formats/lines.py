@@ -7,7 +7,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.recording import Raw, Recording
-from kemba.logs.text import encoding, numbered
+from kemba.logs.text import lines_of, numbered
 
 LVM_END = "***End_of_Header***"
 
@@ -15,7 +15,7 @@ LVM_END = "***End_of_Header***"
 def read_lvm(path: Path) -> Recording:
     """LabVIEW measurement: the first segment; X of its first channel is the time, or its start and
     increment where no X is written. Raises KembaError where the file is of another form."""
-    lines = _lines(path)
+    lines = [line for _, line in lines_of(path)]
     if not lines or not lines[0].startswith("LabVIEW Measurement"):
         raise KembaError(
             f"{path}:1", "is no LabVIEW measurement", "'LabVIEW Measurement' was expected"
@@ -37,15 +37,11 @@ def read_lvm(path: Path) -> Recording:
 
 
 def _lvm_columns(
-    own: dict[str, list[str]],
-    header: list[str],
-    table: np.ndarray,
-    said: list[str],
+    own: dict[str, list[str]], header: list[str], table: np.ndarray, said: list[str]
 ) -> Recording:
-    units = own.get("Y_Unit_Label", [])
+    units = iter(own.get("Y_Unit_Label", []))
     names = numbered(header, len(header))
     columns: Raw = {}
-    channel = 0
     found: dict[str, str] = {}
     for name, values in zip(names, table.T, strict=True):
         if name.startswith("X_Value"):
@@ -53,9 +49,8 @@ def _lvm_columns(
                 columns["time"] = values
             continue
         columns[name] = values
-        if channel < len(units) and units[channel]:
-            found[name] = units[channel]
-        channel += 1
+        if unit := next(units, ""):
+            found[name] = unit
     if "time" not in columns and own.get("Delta_X"):
         start = float((own.get("X0") or ["0"])[0].replace(",", "."))
         step = float(own["Delta_X"][0].replace(",", "."))
@@ -66,7 +61,7 @@ def _lvm_columns(
 def read_sto(path: Path) -> Recording:
     """OpenSim's storage: a header up to `endheader`, then names and numbers; `inDegrees` holds for
     the columns that are angles alone. Raises KembaError where the file is of another form."""
-    lines = _lines(path)
+    lines = [line for _, line in lines_of(path)]
     end = next((i for i, line in enumerate(lines) if line.strip().lower() == "endheader"), None)
     if end is None or end + 1 >= len(lines):
         raise KembaError(str(path), "has no line 'endheader'", "a table of OpenSim was expected")
@@ -76,16 +71,6 @@ def read_sto(path: Path) -> Recording:
     table = _table(path, lines[first + 1 :], None, ".", len(names), first + 2)
     angles = "deg" if "indegrees=yes" in above else "rad"
     return Recording(dict(zip(names, table.T, strict=True)), units={"time": "s"}, angles=angles)
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        with open(path, encoding=encoding(path), newline=None) as stream:
-            return stream.readlines()
-    except OSError as error:
-        raise KembaError(str(path), error.strerror or str(error)) from None
-    except UnicodeDecodeError:
-        raise KembaError(str(path), "is not a text", "a table was expected") from None
 
 
 def _keys(lines: list[str], separator: str) -> dict[str, list[str]]:

@@ -243,13 +243,9 @@ def _items(value: Any) -> Mapping[str, Any]:
         return {key: getattr(value, key) for key in fields}
     if isinstance(value, dict):
         return value
-    if isinstance(value, list | tuple | np.ndarray):
-        return {str(i): item for i, item in enumerate(value)}
     if hasattr(value, "DESCRIPTOR"):
         return {field.name: getattr(value, field.name) for field in value.DESCRIPTOR.fields}
-    if hasattr(value, "__len__") and not isinstance(value, str | bytes):
-        return {str(i): item for i, item in enumerate(value)}  # a repeated field of protobuf
-    return {}
+    return {str(i): item for i, item in enumerate(value)} if _length(value) > 0 else {}
 
 
 def _entries(items: Mapping[str, Any]) -> list[str]:
@@ -261,9 +257,8 @@ def _entries(items: Mapping[str, Any]) -> list[str]:
 
 
 def _length(value: Any) -> int:
-    listed = isinstance(value, list | tuple | np.ndarray) or (
-        hasattr(value, "__len__") and not isinstance(value, str | bytes | dict)
-    )
+    """Of a list of any kind, as a repeated field of protobuf, else -1."""
+    listed = hasattr(value, "__len__") and not isinstance(value, str | bytes | dict)
     return len(value) if listed else -1
 
 

@@ -74,9 +74,21 @@ MOVES, TURNS, SPEED, RATE = 0.01, 1.5, 0.05, 0.2  # m, rad, m/s, rad/s: less is 
 
 
 def reached(certificate: Certificate, plan: Trajectory) -> list[str]:
-    """What a motion comes to, in words: its apex, how far it goes and turns, how fast it ends, what
-    is reached of further goals, and how long it takes."""
-    found = [f"apex {max(plan['body/z']):.3f} m{_feet(plan)}"]
+    """What a plan comes to, in words: as `moved` says it, what is reached of further goals, and how
+    long it takes."""
+    height, *found = moved(plan)
+    others = {
+        asked.goal: f"{asked.goal} {asked.value:.3g} {asked.unit}".removesuffix(" 1")
+        for asked in certificate.asked
+        if asked.goal and not asked.text.endswith((":body/x", ":body/z"))  # told already
+    }
+    first = f"apex {height}{_feet(plan)}"
+    return [first, *found, *others.values(), f"{plan.time[-1]:.3f} s"]
+
+
+def moved(plan: Trajectory) -> list[str]:
+    """How high a body comes, how far it goes and turns, and how fast it ends, in words."""
+    found = [f"{max(plan['body/z']):.3f} m"]
     rows = {q: plan[f"body/{q}"] for q in ("x", "pitch", "vx", "pitch_rate") if f"body/{q}" in plan}
     change = {q: float(values[-1] - values[0]) for q, values in rows.items()}
     last = {q: float(values[-1]) for q, values in rows.items()}
@@ -88,12 +100,7 @@ def reached(certificate: Certificate, plan: Trajectory) -> list[str]:
         found.append(f"{speed:.2f} m/s at the end")
     if abs(rate := last.get("pitch_rate", 0.0)) >= RATE:
         found.append(f"turning at {rate:.2f} rad/s at the end")
-    others = {
-        asked.goal: f"{asked.goal} {asked.value:.3g} {asked.unit}".removesuffix(" 1")
-        for asked in certificate.asked
-        if asked.goal and not asked.text.endswith((":body/x", ":body/z"))  # told already
-    }
-    return [*found, *others.values(), f"{plan.time[-1]:.3f} s"]
+    return found
 
 
 def _feet(trajectory: Trajectory) -> str:

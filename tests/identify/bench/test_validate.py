@@ -6,6 +6,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from kemba.effects.pneumatics.switching import pulses
+from kemba.identify.bench.bench_log import SmoothedMotion
+from kemba.identify.bench.prediction import RigModel
 from kemba.identify.bench.problem import bench_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -122,3 +125,23 @@ def test_an_effect_is_no_mistake(bench_log: BenchLog) -> None:
     """Zeros that sensors may have are for `discover` to find."""
     change = {"piston/x": ("piston/x", 1.0, 8e-3), "piston/F": ("piston/F", 1.0, 20.0)}
     assert not bench_problem([taken(bench_log(), change)], load_model(rig=True)).contradictions
+
+
+@pytest.mark.parametrize("mistake", ["", "valves", "force", "position"])
+def test_another_supply_is_no_mistake_and_hides_none(mistake: str) -> None:
+    """One chamber of a locked rod, at less pressure, looks like the smaller one."""
+    time = np.arange(0.0, 1.0, 1e-3)
+    on, zero = ((time > 0.2) & (time < 0.6)).astype(float), np.zeros(len(time))
+    rig, still = RigModel(load_model(rig=True), (), ()), SmoothedMotion(time, *[zero] * 4, 0.0)
+    force = rig.predict(still, (pulses(time, on), pulses(time, zero)), {}).force
+    noise = np.random.default_rng(0).standard_normal((2, len(time)))
+    columns = {
+        "piston/x [m]": 1e-5 * noise[0],
+        "valve/extend [1]": on,
+        "valve/retract [1]": zero,
+        "piston/F [N]": 0.85 * force + 0.3 * noise[1],
+    }
+    change, words = MISTAKES[mistake] if mistake else ({}, "")
+    log = taken(Trajectory(time, columns, {"name": "run", "kind": "bench"}), change)
+    faults = bench_problem([log], load_model(rig=True)).contradictions
+    assert [bool(re.search(words, str(fault))) for fault in faults] == [True] * bool(mistake)

@@ -90,18 +90,72 @@ def test_another_unit_of_a_drive_is_named_and_a_heavier_axis_is_none(
     assert re.search(words, str(raised.value)), str(raised.value)
 
 
-@pytest.mark.parametrize("column", ["axis/q [m]", "axis/tau [N]"])
-def test_without_a_weight_another_unit_is_that_of_the_motion_or_of_the_force(
-    column: str, tmp_path: Path
+@pytest.mark.parametrize(
+    ("q", "tau", "time", "words"),
+    [
+        (0.1, 1.0, 1.0, r"10 times"),
+        (1.0, 10.0, 1.0, r"10 times"),
+        (39.37, 1.0, 1e3, r"25000 times"),  # inches and milliseconds
+        (1e3, 1e-3, 1.0, r"1e-06 times"),  # millimetres and kilonewtons
+    ],
+)
+@pytest.mark.parametrize("load", [None, {"mass": "3 kg"}])
+def test_where_no_weight_hangs_on_the_position_no_unit_is_blamed_alone(
+    q: float, tau: float, time: float, words: str, load: dict[str, str] | None, tmp_path: Path
 ) -> None:
-    dump_yaml({"rig": {"kind": "drive", "inertia": "2 kg"}}, tmp_path / "model.yaml")
-    columns = {"axis/q [m]": Q, "axis/tau [N]": 2.0 * A + 3.0 * np.tanh(V / 0.01)}
-    small = column == "axis/q [m]"
-    columns[column] = columns[column] * (0.1 if small else 10.0)
-    log = Trajectory(TIME, columns, RUN | {"kind": "drive"})
-    words = r"axis/tau is .* too large .*; or axis/q is .* too small .*; or several of these are"
-    with pytest.raises(BadData, match=words):
-        rig_problem([log], load_model(tmp_path / "model.yaml")).validate()
+    """Inertia and friction look alike in many pairs of units: advice on one would be false."""
+    rig = {"kind": "drive", "inertia": "2 kg"} | ({"load": load} if load else {})
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    force = 2.0 * A + (3.0 * (A + 9.81) if load else 0.0) + 3.0 * np.tanh(V / 0.01)
+    model = load_model(tmp_path / "model.yaml")
+    for factors in ((1.0, 1.0, 1.0), (q, tau, time)):
+        columns = {"axis/q [m]": factors[0] * Q, "axis/tau [N]": factors[1] * force}
+        log = Trajectory(factors[2] * TIME, columns, RUN | {"kind": "drive"})
+        if factors == (1.0, 1.0, 1.0):
+            assert rig_problem([log], model).validate() == []
+    said = rf"^log: axis/tau is about {words} what suits axis/q and the time \(the unit of one"
+    with pytest.raises(BadData, match=said) as raised:
+        rig_problem([log], model).validate()
+    assert "; or " not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("sign", "turned", "zero", "words"),
+    [
+        (1, 1, 0.0, ""),
+        (1, 1, 20.0, ""),
+        (-1, -1, 0.0, "axis/q has the reversed sign and axis/tau has the reversed sign"),
+        (-1, 1, 0.0, "axis/q has the reversed sign"),
+        (1, -1, 0.0, "axis/tau has the reversed sign"),
+    ],
+)
+def test_a_weight_tells_up_from_down(
+    sign: int, turned: int, zero: float, words: str, tmp_path: Path
+) -> None:
+    """A zero of twice the weight would put an axis right that counts downwards; others stay."""
+    rig = {"kind": "drive", "inertia": "2 kg", "load": {"mass": "3 kg"}}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    force = 2.0 * A + 3.0 * (A + 9.81) + 3.0 * np.tanh(V / 0.01)
+    columns = {"axis/q [m]": sign * Q, "axis/tau [N]": turned * force + zero}
+    problem = rig_problem(
+        [Trajectory(TIME, columns, RUN | {"kind": "drive"})], load_model(tmp_path / "model.yaml")
+    )
+    if not words:
+        assert problem.validate() == []
+    else:
+        with pytest.raises(BadData, match=f"^log: {words}; the force answers"):
+            problem.validate()
+
+
+def test_a_pendulum_that_hardly_turns_tells_position_and_torque_together() -> None:
+    """Degrees and pound-inches of a motion whose sine is straight: any two sizes in their ratio."""
+    right = pendulum(0.1 * Q, 0.0 * Q)
+    weight = (0.02 + 1.5 * 0.25**2) * 0.1 * A + 1.5 * 0.25 * 9.81 * np.sin(0.1 * Q)
+    torque = weight + 0.04 * np.tanh(0.1 * V / 0.01) + 0.1 * right["axis/tau"]
+    log = pendulum(np.degrees(right["axis/q"]), 8.85 * torque)
+    said = r"run: axis/tau is about 0\.15 times what suits axis/q \(the unit of one of them, or of"
+    with pytest.raises(BadData, match=said):
+        rig_problem([log], load_model("pendulum_rig")).validate()
 
 
 def test_a_cylinder() -> None:
