@@ -7,7 +7,7 @@ through the same filter tells which. The measured autocovariances are a sum of t
 weights: the variances of the kinds.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,10 +61,28 @@ class Kind:
     memory: float
 
 
-def chosen_noise(
-    a: Array, b: Array, kinds: Sequence[Kind], most: Array, known: Flags
+def learnt_noise(
+    errors: Array, counts: Array, made: Mapping[Kind, Array], most: Array
 ) -> tuple[ChannelNoise, ...]:
-    """The noise of each channel: white, unless lags explain `b` (rows,) clearly better."""
+    """The noise of each of the first channels: white, unless lags explain its autocovariances
+    clearly better, or where too few rows are known.
+
+    `errors` (n, L, m), NaN where there is none; `counts` (m, lags) as `pairs` gives them; `made`:
+    autocovariances (m, lags) that each kind of noise would make of unit variance; `most`
+    (channels,): largest spread that is believed.
+    """
+    measured = covariances(errors[..., None], errors, counts)
+    known = counts[: len(most), 0] >= ColourSettings.fewest
+    return chosen_noise(made, measured, counts, most, known)
+
+
+def chosen_noise(
+    made: Mapping[Kind, Array], measured: Array, counts: Array, most: Array, known: Flags
+) -> tuple[ChannelNoise, ...]:
+    """The same from `measured` autocovariances (m, lags); `known` (channels,)."""
+    weight = np.sqrt(counts) / np.maximum(measured[:, :1], 1e-9)  # chi2 of every covariance
+    a = np.stack([(c * weight).ravel() for c in made.values()], axis=1)
+    b = (measured * weight).ravel()
     settings = ColourSettings
     scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
     drift = min(settings.drifts)
@@ -73,10 +91,11 @@ def chosen_noise(
         x, left = nnls(np.where(allowed, a / scale, 0.0), b)
         return np.where(allowed, x / scale, 0.0), float(left) ** 2
 
-    allowed = np.ones(len(kinds), dtype=bool)
+    allowed = np.ones(len(made), dtype=bool)
     x, chi2 = fit(allowed)
-    channel = np.array([k.channel for k in kinds])
-    memory = np.array([k.memory for k in kinds])
+    channel, memory = (
+        np.array(x) for x in zip(*((k.channel, k.memory) for k in made), strict=True)
+    )
 
     def lags_of(i: int) -> list[Flags]:
         """Which kinds are colour of a channel, and which are its drift."""
@@ -121,14 +140,6 @@ def _sound(white: float, lags: Sequence[tuple[float, float]], most: float) -> Ch
     scale = min(max(whole, settings.least), most) / max(whole, 1e-9)
     white = max(white, settings.sharpest * whole)
     return ChannelNoise(scale * white, tuple((scale * s, memory) for s, memory in kept))
-
-
-def weighted(columns: Sequence[Array], measured: Array, counts: Array) -> tuple[Array, Array]:
-    """Autocovariances (m, lags) that each kind makes, and the `measured` ones, as rows of a least
-    squares problem in which each row has unit sigma; `counts` (m, lags): pairs of rows."""
-    weight = np.sqrt(counts) / np.maximum(measured[:, :1], 1e-9)  # chi2 of every covariance
-    a = np.stack([(c * weight).ravel() for c in columns], axis=1)
-    return a, (measured * weight).ravel()
 
 
 def lag_noise(memories: Sequence[float], h: Array, draws: int, rng: np.random.Generator) -> Array:

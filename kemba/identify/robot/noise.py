@@ -17,11 +17,10 @@ from kemba.identify.problem.sensor_noise import (
     ChannelNoise,
     ColourSettings,
     Kind,
-    chosen_noise,
     covariances,
     lag_noise,
+    learnt_noise,
     pairs,
-    weighted,
 )
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.filter import FilterGains, System, innovations
@@ -65,6 +64,9 @@ def simulated(system: System, draws: int, rng: np.random.Generator) -> Array:
     return np.asarray(y)
 
 
+# largest learnt noise, in sigmas that a sidecar states, and in those that were told from
+# differences of rows: third differences show a tenth of AR(1) noise of 0.98 per row
+STATED, GUESSED = 1.5, 10.0
 DRAWS = 6  # simulated logs
 WIDTH = 21  # nodes over which the power is averaged; odd
 LEAST = 0.02  # smallest power
@@ -103,56 +105,38 @@ def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:
     return errors
 
 
-def learnt_noise(
+def noise_behind(
     system: System,
     gain: FilterGains,
     errors: Array,
-    sigma: Array,
-    h: Array,
+    batch: Batch,
     pushes: Sequence[Array],
-    most: Array,
     drifts: bool,
 ) -> tuple[ChannelNoise, ...]:
-    """Noise of every channel, in units of its stated sigma.
+    """Noise of every channel, in units of its stated sigma; as stated where a correlation time is.
 
-    `errors` (n, L, m): whitened errors of a flexible model, NaN where there is none. `sigma`
-    (L, channels): stated noise; `h` (n, L) [s]. `pushes`: acceleration (n, L, k) per unit of every
-    force that may be missing. `most` (channels,): largest spread that is believed. `drifts`: slow
-    drifts are looked for as well; only where the model is good, for what it lacks is slow, too.
+    `errors` (n, L, m): whitened errors of a flexible model, NaN where there is none. `pushes`:
+    acceleration (n, L, k) per unit of every force that may be missing. `drifts`: slow drifts are
+    looked for as well; only where the model is good, for what it lacks is slow, too.
     """
-    settings, channels = ColourSettings, sigma.shape[1]
-    counts = pairs(errors)
-    measured = covariances(errors[..., None], errors, counts)
-    known = counts[:channels, 0] >= settings.fewest
-    if not known.any():
-        return tuple(ChannelNoise() for _ in range(channels))
-    kinds: list[Kind] = []
-    columns: list[Array] = []
+    settings, sigma, h = ColourSettings, batch.sigma, batch.h
+    counts, channels = pairs(errors), sigma.shape[1]
+    made: dict[Kind, Array] = {}
     memories = (0.0, *settings.memories, *(settings.drifts if drifts else ()))
-    m = system.H.shape[2]
     for channel in range(channels):
         draws = lag_noise(memories, h, settings.draws, np.random.default_rng(17 + channel))
-        y = np.zeros((*h.shape, m, len(memories) * settings.draws))  # memory 0 is white
+        y = np.zeros((*h.shape, system.H.shape[2], len(memories) * settings.draws))
         y[:, :, channel] = sigma[:, channel, None] * draws.reshape(*h.shape, -1)
-        seen = innovations(system, gain, y, None)
-        parts = np.split(seen, len(memories), axis=-1)
-        columns += [covariances(part, errors, counts) for part in parts]
-        kinds += [Kind(channel, memory) for memory in memories]
-    for i, push in enumerate(pushes):
+        parts = np.split(innovations(system, gain, y, None), len(memories), axis=-1)
+        for memory, part in zip(memories, parts, strict=True):  # memory 0 is white
+            made[Kind(channel, memory)] = covariances(part, errors, counts)
+    for i, push in enumerate(pushes, start=channels):
         force = lag_noise([settings.force], h, settings.draws, np.random.default_rng(5))
         seen = innovations(system, gain, None, np.asarray(push[..., None] * force))
-        columns.append(covariances(seen, errors, counts))
-        kinds.append(Kind(channels + i, settings.force))
-    return chosen_noise(*weighted(columns, measured, counts), kinds, most, known)
-
-
-class SensorNoiseSettings:
-    """How far learnt noise may differ from what was known before."""
-
-    stated = 1.5  # largest learnt noise, in sigmas that a sidecar states
-    # the same, in sigmas that were told from differences of rows: third differences show a tenth of
-    # AR(1) noise of 0.98 per row
-    guessed = 10.0
+        made[Kind(i, settings.force)] = covariances(seen, errors, counts)
+    found = learnt_noise(errors, counts, made, np.where(batch.stated, STATED, GUESSED))
+    known = np.isfinite(batch.memory)
+    return tuple(s if on else f for s, f, on in zip(stated_noise(batch), found, known, strict=True))
 
 
 def stated_noise(batch: Batch) -> tuple[ChannelNoise, ...]:

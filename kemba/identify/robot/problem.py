@@ -1,6 +1,6 @@
 """Robot logs under one model as whitened residuals: the innovations of a filter around the data."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -15,7 +15,7 @@ from kemba.identify.problem.candidates import (
     robot_candidates,
     sensor_candidates,
 )
-from kemba.identify.problem.problem import Array, Candidate, Problem, Theta, mean_slope
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
 from kemba.identify.problem.structure import (
     FIGURES,
@@ -175,28 +175,22 @@ class RobotProblem(RobotForces):
         """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]))[:, 0]
 
-    def residuals(self, thetas: Sequence[Theta]) -> Array:
-        """The same (n, c) at each theta; the filter takes them side by side."""
-        return np.stack(list(self.state.each_residual(thetas)), axis=1)
+    def each_residual(self, thetas: Sequence[Theta]) -> Iterator[Array]:
+        """The same at each theta; the filter takes them side by side."""
+        return self.state.each_residual(thetas)
 
     def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """Derivatives (n, k) where the force is linear in the parameter, else secants."""
-        names = list(names)
-        if not names:
-            return np.empty((len(self.residual(theta)), 0))
+        if not (names := list(names)):
+            return super().jacobian(theta, names)
+        direct = [n for n in names if self._is_direct(n)]
+        others = [n for n in names if n not in direct]
         # the shapes of absent effects have their typical value
         typical = {k: v.typical for k, v in self.parameters().items() if np.isfinite(v.typical)}
-        direct = [n for n in names if self._is_direct(n)]
         found = self.state.slopes({**typical, **theta}, direct)
         columns = dict(zip(direct, found, strict=True))
-        steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
-        if steps:
-            moved = [{**theta, **step} for group in steps.values() for step, _ in group]
-            there = self.state.each_residual([theta, *moved])
-            base = next(there)
-            for name, group in steps.items():
-                ends = [next(there) for _ in group]
-                columns[name] = mean_slope(base, ends, [h for _, h in group])
+        if others:
+            columns |= dict(zip(others, super().jacobian(theta, others).T, strict=True))
         return np.stack([columns[n] for n in names], axis=-1)
 
     def _is_direct(self, name: str) -> bool:

@@ -25,7 +25,7 @@ from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole
 from kemba.identify.robot.contact import ContactSchedule, loaded
 from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
 from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
-from kemba.identify.robot.noise import Noise, SensorNoiseSettings, learnt_noise, stated_noise
+from kemba.identify.robot.noise import Noise, noise_behind
 from kemba.identify.robot.physics import Index, Physics
 from kemba.identify.robot.reference import (
     LOOSE,
@@ -392,21 +392,8 @@ def _along(
 
 def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
     """The noise of each channel, learnt from the rows `left` (rows,) that a flexible model leaves;
-    as stated where a correlation time is stated. `drifts`: slow drifts are looked for, too."""
-    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings
-    k = motion.ref.q.shape[2]
-    pushed = motion.inverse @ motion.channels[..., :k]
-    most = np.where(batch.stated, settings.stated, settings.guessed)
-    found = learnt_noise(
-        motion.system,
-        state.gain,
-        state.spread(left),
-        batch.sigma,
-        batch.h,
-        [pushed[..., i] for i in range(k)],
-        most,
-        drifts,
-    )
-    stated = stated_noise(batch)
-    known = np.isfinite(batch.memory)
-    return tuple(s if on else f for s, f, on in zip(stated, found, known, strict=True))
+    `drifts`: slow drifts are looked for, too."""
+    motion, k = state.motion, state.motion.ref.q.shape[2]
+    pushes = np.moveaxis(motion.inverse @ motion.channels[..., :k], -1, 0)
+    errors = state.spread(left)
+    return noise_behind(motion.system, state.gain, errors, state.batch, list(pushes), drifts)

@@ -10,6 +10,7 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue, measure
 
+from kemba.identify.logs.reading import thinned
 from kemba.identify.problem.problem import Problem
 from kemba.identify.robot.noise import predicted_error
 from kemba.identify.robot.problem import PREDICTED, RobotProblem, robot_problem
@@ -126,13 +127,13 @@ def test_gaps_and_a_log_that_begins_in_the_air_are_borne() -> None:
     assert np.sqrt(np.mean(r**2)) < 1.15
 
 
-def test_denser_rows_are_averaged_and_sparse_ones_bridged() -> None:
+def test_denser_rows_are_thinned_and_sparse_ones_bridged() -> None:
     (log, *_), _ = hops(runs=1)
     valves = [n for n in log.names if "valve" in n or "tau" in n]
     for step in (0.25e-3, 2e-3):
         times = np.arange(log.time[0], log.time[-1], step)
         again = log.interpolate(times, hold=valves)
-        problem = robot_problem([again], load_model("planning"))
+        problem = robot_problem([thinned(again)], load_model("planning"))
         assert 0.7e-3 <= np.median(problem.batch.h[problem.batch.valid]) <= 1.6e-3
         assert np.isfinite(problem.residual({})).all()
 
