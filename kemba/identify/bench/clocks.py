@@ -27,31 +27,29 @@ OWNERS: Mapping[str, Mapping[str, float]] = {
 }
 
 
-class ClockSettings:
-    """Clocks that run at different rates."""
-
-    # prior sigma of what is left of a rate after logs were put on one clock: the search for it was
-    # off by 0.1e-3 to 0.3e-3 on logs of the twin
-    rate = 3e-4
-    farthest = 0.16  # largest drift over a log that is looked for before any fit [s]
-    stride = 8e-3  # step of that search [s]: the fastest rise time of Table I
-    # rows of the logs in which a drift is looked for: the search takes about 6 s of CPU time for so
-    # many; `check` has to end in 10 s
-    rows = 6000
-    # mean square, in noise units, that a fit with all effects may leave of logs in which no drift
-    # is looked for: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing
-    # 0.9 to 19
-    fits = 1.0
-    # share of its cost that such a fit may keep with a drift that is believed: on the twin, 0.99 or
-    # more on 22 logs without drift, 0.02 to 0.6 with 10 ms or more of the commands
-    better = 0.9
-    again = 3.0  # factor of the least cost within which a trial is linearised again
+# Clocks that run at different rates.
+# prior sigma of what is left of a rate after logs were put on one clock: the search for it was
+# off by 0.1e-3 to 0.3e-3 on logs of the twin
+RATE = 3e-4
+FARTHEST = 0.16  # largest drift over a log that is looked for before any fit [s]
+STRIDE = 8e-3  # step of that search [s]: the fastest rise time of Table I
+# rows of the logs in which a drift is looked for: the search takes about 6 s of CPU time for so
+# many; `check` has to end in 10 s
+ROWS = 6000
+# mean square, in noise units, that a fit with all effects may leave of logs in which no drift
+# is looked for: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing
+# 0.9 to 19
+FITS = 1.0
+# share of its cost that such a fit may keep with a drift that is believed: on the twin, 0.99 or
+# more on 22 logs without drift, 0.02 to 0.6 with 10 ms or more of the commands
+BETTER = 0.9
+AGAIN = 3.0  # factor of the least cost within which a trial is linearised again
 
 
 def nuisance(drift: Drift | None) -> dict[str, tuple[float, float]]:
     """Nominal value and prior sigma of the rates that are not exactly known after a drift."""
     moved = OWNERS[drift[0]] if drift else ()
-    return dict.fromkeys(moved, (0.0, ClockSettings.rate))
+    return dict.fromkeys(moved, (0.0, RATE))
 
 
 def commands_by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
@@ -79,7 +77,7 @@ def motion_by_one_clock(motion: SmoothedMotion, theta: Theta) -> SmoothedMotion:
 
 def looked_at(logs: Sequence[Trajectory]) -> list[Trajectory]:
     """The first logs, as many as are searched for a drift; the last of them is cut."""
-    found, left = [], ClockSettings.rows
+    found, left = [], ROWS
     for log in logs:
         found.append(log.rows(slice(0, left)))
         left -= len(log)
@@ -95,31 +93,31 @@ def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:
     The model with all effects free is linearised and fitted at every trial of a rate; where a rate
     does well it is linearised again, since slopes along a wrong motion may praise a wrong rate.
     """
-    settings, at_zero = ClockSettings, _Linearised(problem, {})
+    at_zero = _Linearised(problem, {})
     usual = at_zero.cost({})
-    if 2.0 * usual < settings.fits * at_zero.rows:
+    if 2.0 * usual < FITS * at_zero.rows:
         return None
-    step = settings.stride / max(float(np.ptp(log.motion.time)) for log in logs)
-    half = step * np.arange(1.0, settings.farthest / settings.stride + 0.5)
+    step = STRIDE / max(float(np.ptp(log.motion.time)) for log in logs)
+    half = step * np.arange(1.0, FARTHEST / STRIDE + 0.5)
     costs = {
         (owner, sign * rate): at_zero.cost(_theta(owner, sign * rate))
         for owner in OWNERS
         for sign in (1.0, -1.0)
         for rate in (0.5 * step, *half.tolist())
     }
-    if min(costs.values()) > settings.better * usual:
+    if min(costs.values()) > BETTER * usual:
         return None
     leaders: dict[tuple[str, bool], Drift] = {}
     for owner, rate in sorted(costs, key=costs.__getitem__):
-        if costs[owner, rate] < settings.again * min(costs.values()):
+        if costs[owner, rate] < AGAIN * min(costs.values()):
             leaders.setdefault((owner, rate > 0), (owner, rate))
     found = [_refined(problem, owner, rate, step) for owner, rate in leaders.values()]
-    alike = min(found)[0] / settings.better  # where the piston hardly moves, its clock is no matter
+    alike = min(found)[0] / BETTER  # where the piston hardly moves, its clock is no matter
     order = list(OWNERS)
     within = [(cost, drift) for cost, drift in found if cost <= alike]
     least, (owner, rate) = min(within, key=lambda item: (order.index(item[1][0]), item[0]))
     inside = abs(rate) < half[-1] - 0.5 * step
-    return (owner, rate) if inside and least < settings.better * usual else None
+    return (owner, rate) if inside and least < BETTER * usual else None
 
 
 class _Linearised:

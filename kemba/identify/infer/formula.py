@@ -86,7 +86,7 @@ def extended(search: Search, formulas: Mapping[str, Array]) -> tuple[Ranker, Arr
         np.concatenate([linear.width, widths, sigmas]),
         jacobian,
         mode.residual,
-        search.base.division.blocks,
+        search.base.blocks,
     )
     problem = search.problem
     known = {**problem.candidates, **candidates}

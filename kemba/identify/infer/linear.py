@@ -18,14 +18,11 @@ from kemba.identify.problem.problem import (
     Theta,
 )
 
-
-class LinearSettings:
-    """Where the linearised problem may lead."""
-
-    farthest = 4.0  # largest distance of a switch from off, in sizes, where it is tried
-    widths = 8.0  # largest distance of a nominal figure from its prior mean, in sigmas
-    blocks = 4  # fewest blocks: fewer runs are cut in time: for leaving out a quarter
-    pieces = 4  # pieces of a run that are told apart: quarters
+# Where the linearised problem may lead.
+FARTHEST = 4.0  # largest distance of a switch from off, in sizes, where it is tried
+WIDTHS = 8.0  # largest distance of a nominal figure from its prior mean, in sigmas
+BLOCKS = 4  # fewest blocks: fewer runs are cut in time: for leaving out a quarter
+PIECES = 4  # pieces of a run that are told apart: quarters
 
 
 @dataclass(frozen=True)
@@ -142,7 +139,7 @@ def within(candidates: Mapping[str, Candidate], theta: Theta) -> dict[str, float
     for key in clipped.keys() & bounds.keys():
         p, value = bounds[key], clipped[key]
         if np.isnan(p.typical):  # a switch, which stays within a few sizes of off
-            reach = LinearSettings.farthest * p.size
+            reach = FARTHEST * p.size
             value = np.clip(value, p.off - reach, p.off + reach)
         clipped[key] = float(np.clip(value, p.lower, p.upper))
     return usual_shapes(candidates, clipped) | clipped
@@ -187,7 +184,7 @@ def priors(problem: Problem, theta: Theta, names: Iterable[str]) -> tuple[Array,
 def time_blocks(problem: Problem, wanted: int | None = None, shortest: float = 0.0) -> Labels:
     """A label (n,) per row: every run is a block, cut in time where there are fewer runs than
     `wanted` (None: the setting), or cut into pieces of at least `shortest` [s]."""
-    wanted = LinearSettings.blocks if wanted is None else wanted
+    wanted = BLOCKS if wanted is None else wanted
     rows = problem.rows()
     pieces = max(1, int(np.ceil(wanted / max(len(problem.runs), 1))))
     labels = np.zeros(len(rows), dtype=int)
@@ -206,12 +203,11 @@ def estimate(problem: Problem, linear: Linear, z: Array) -> dict[str, float]:
     Nominal figures stay within their reach: a log that is wrong may ask for a negative rise time.
     """
     theta: dict[str, float] = {}
-    widths = LinearSettings.widths
     for name, value in zip(linear.names, z, strict=True):
         theta[name] = float(np.exp(value)) if is_shape(problem, name) else float(value)
         if name in problem.nuisance:
             nominal, sigma = problem.nuisance[name]
-            theta[name] = float(np.clip(value, nominal - widths * sigma, nominal + widths * sigma))
+            theta[name] = float(np.clip(value, nominal - WIDTHS * sigma, nominal + WIDTHS * sigma))
     absent = (c for c in problem.candidates.values() if not is_on(theta, c.key, c.lead))
     off = {key for c in absent for key in tuple(c.keys())}
     return {k: v for k, v in theta.items() if k not in off}

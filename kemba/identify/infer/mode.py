@@ -16,13 +16,10 @@ from kemba.identify.infer.linear import Linear, estimate, moved, priors, usual_s
 from kemba.identify.infer.spike_slab import Hypothesis, Ranker
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
-
-class SmallEffectsSettings:
-    """How the mode of a hypothesis is found, every other effect being small."""
-
-    rounds = 5  # linear steps, each with the residual where it led
-    change = 0.1  # change of the evidence at which the last step is done [nats]
-    absurd = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
+# How the mode of a hypothesis is found, every other effect being small.
+ROUNDS = 5  # linear steps, each with the residual where it led
+CHANGE = 0.1  # change of the evidence at which the last step is done [nats]
+ABSURD = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
 
 
 @dataclass(frozen=True)
@@ -49,23 +46,22 @@ def mode_of(
     `linear` and its `jacobian` (n, k): slopes that hold there; `blocks` (n,) label the rows. Where
     the motion depends on the model, the residual is as straight as its slopes: the start is kept.
     """
-    settings = SmallEffectsSettings
     slopes = linear, jacobian, blocks
     tried = [_at(problem, hypothesis, theta, problem.residual(theta), slopes) for theta in starts]
     best = at = min(tried, key=lambda mode: mode.cost)
     reached = _ranker(problem, at.linear).score(hypothesis).log_evidence
-    for _ in range(0 if problem.moves else settings.rounds):
+    for _ in range(0 if problem.moves else ROUNDS):
         theta = _possible(problem, hypothesis, at.linear)
         try:
             r = problem.residual(theta)
         except KembaError:
             break  # a linear estimate may point to where nothing can be simulated
-        if not np.all(np.abs(r) < settings.absurd):
+        if not np.all(np.abs(r) < ABSURD):
             break
         at = _at(problem, hypothesis, theta, r, slopes)
         best = at if at.cost < best.cost else best
         before, reached = reached, _ranker(problem, at.linear).score(hypothesis).log_evidence
-        if abs(reached - before) < settings.change:
+        if abs(reached - before) < CHANGE:
             break
     return best
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from kemba.identify.infer.linear import (
+    PIECES,
     Linear,
-    LinearSettings,
     condense,
     estimate,
     is_on,
@@ -22,15 +22,12 @@ from kemba.identify.infer.linear import (
 from kemba.identify.infer.mode import Mode, mode_of
 from kemba.identify.infer.refit import Fit, Frozen, refit
 from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker, Score
-from kemba.identify.infer.windows import Windows, windows_of
+from kemba.identify.infer.windows import windows_of
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 from kemba.identify.problem.sensor_faults import moves_readings
 
-
-class DriftSettings:
-    """When the sensors are taken to drift."""
-
-    strong = 3.0  # evidence from which sensors drift [nats]: Kass and Raftery 1995, twenty to one
+# When the sensors are taken to drift.
+STRONG = 3.0  # evidence from which sensors drift [nats]: Kass and Raftery 1995, twenty to one
 
 
 def with_learnt_colour(
@@ -54,7 +51,7 @@ def _with_drift(problem: Problem, theta: Theta) -> Problem:
     if drifting is None:
         return problem
     gain = log_likelihood(drifting, theta) - log_likelihood(problem, theta)
-    return drifting if gain > DriftSettings.strong else problem
+    return drifting if gain > STRONG else problem
 
 
 def log_likelihood(problem: Problem, theta: Theta) -> float:
@@ -106,33 +103,6 @@ class LinearisationPoint:
         return float(np.sqrt(self.windowed.power.sum() / self.windowed.count.sum()))
 
 
-class Division:
-    """The rows of a problem divided into time blocks (n,), quarters of runs, and into aggregation
-    windows; `parts` (b,): which blocks are left out together, as a rule all those of a run."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        self.windows: Windows = windows_of(problem)
-        usual = time_blocks(problem)
-        fine = time_blocks(problem, LinearSettings.pieces * len(problem.runs))
-        windows = np.unique(fine[self.windows.first])
-        short = len(windows) <= fine.max()  # a piece in which no window begins
-        self.blocks: Labels = usual if short else fine
-        self.parts: Labels = usual[np.unique(self.blocks, return_index=True)[1]]
-
-    def linear(
-        self, theta: Mapping[str, float], names: tuple[str, ...], jacobian: Array, r: Array
-    ) -> tuple[Linear, Linear]:
-        """The problem about theta with these slopes (n, k), row by row and by windows."""
-        at = priors(self.problem, theta, names)
-        fine = condense(names, *at, jacobian, r, self.blocks)
-        if len(self.windows.first) == len(r):
-            return fine, fine
-        sums = self.windows.sums(jacobian), self.windows.sums(r)
-        windowed = condense(names, *at, *sums, self.blocks[self.windows.first])
-        return fine, windowed
-
-
 def within_bounds(problem: Problem, point: LinearisationPoint) -> Array:
     """z (k,) of a refitted hypothesis where its density is largest within the bounds of its
     effects and of the nuisance parameters; shapes as logarithms, as in `Linear`."""
@@ -179,7 +149,8 @@ class Baseline:
     `problem`: the problem under the noise colour learnt. `point`: the null. `table`: linear
     log evidence of every single effect. `jacobian` (n, k) and `residual` (n,) at the null;
     `frozen`: slopes along the nuisance parameters, for refits. `begin`: where the fit of curved
-    figures begins.
+    figures begins. `windows`: aggregation windows; `blocks` (n,): time blocks of the rows, quarters
+    of runs; `parts` (b,): which blocks are left out together, as a rule all those of a run.
     """
 
     point: LinearisationPoint
@@ -189,7 +160,13 @@ class Baseline:
 
     def __init__(self, problem: Problem, begin: Mapping[str, float] | None = None) -> None:
         self.problem, self.begin = problem, dict(begin or {})
-        self.division = Division(problem)
+        self.windows = windows_of(problem)
+        usual = time_blocks(problem)
+        fine = time_blocks(problem, PIECES * len(problem.runs))
+        windows = np.unique(fine[self.windows.first])
+        short = len(windows) <= fine.max()  # a piece in which no window begins
+        self.blocks: Labels = usual if short else fine
+        self.parts: Labels = usual[np.unique(self.blocks, return_index=True)[1]]
         self.table: dict[Hypothesis, float] = {}
         self._start()
 
@@ -204,13 +181,12 @@ class Baseline:
 
     def seen_from(self, theta: Mapping[str, float]) -> None:
         """Learn the noise colour from the residual at theta, and rank all hypotheses again."""
-        blocks = self.division.blocks
-        self.problem = with_learnt_colour(self.problem, theta, blocks, careful=True)
+        self.problem = with_learnt_colour(self.problem, theta, self.blocks, careful=True)
         self._rank(self.point.fit.theta)
 
     def _start(self) -> None:
         """Null fit, noise colour, and the linear table at the null."""
-        problem, blocks = self.problem, self.division.blocks
+        problem, blocks = self.problem, self.blocks
         free = tuple(problem.nuisance)
         if problem.own_figures:  # a linear estimate of these runs off
             frozen = Frozen(free, problem.jacobian(self.begin, free))
@@ -246,23 +222,33 @@ class Baseline:
         """Score the null with the slopes as they are, at theta or where it was."""
         theta = self.point.fit.theta if theta is None else theta
         names = names or self.point.linear.names
-        linear, windowed = self.division.linear(theta, names, self.jacobian, self.residual)
+        linear, windowed = self._linear(theta, names, self.jacobian, self.residual)
         fit = Fit(dict(theta), 0.5 * float(self.residual @ self.residual))
-        mode = mode_of(self.problem, NULL, [theta], linear, self.jacobian, self.division.blocks)
+        mode = mode_of(self.problem, NULL, [theta], linear, self.jacobian, self.blocks)
         score = self.ranker(mode.linear).score(NULL)
         self.point = LinearisationPoint(NULL, fit, linear, windowed, mode, score)
+
+    def _linear(
+        self, theta: Theta, names: Names, jacobian: Array, r: Array
+    ) -> tuple[Linear, Linear]:
+        """The problem about theta with these slopes (n, k), row by row and by windows."""
+        at = priors(self.problem, theta, names)
+        fine = condense(names, *at, jacobian, r, self.blocks)
+        if len(self.windows.first) == len(r):
+            return fine, fine
+        sums = self.windows.sums(jacobian), self.windows.sums(r)
+        return fine, condense(names, *at, *sums, self.blocks[self.windows.first])
 
     def judged(
         self, hypothesis: Hypothesis, fit: Fit, names: Names, slopes: Array
     ) -> LinearisationPoint:
         """The point of a refitted hypothesis with its slopes (n, k) along `names`."""
         r = self.problem.residual(fit.theta)
-        linear, windowed = self.division.linear(fit.theta, names, slopes, r)
+        linear, windowed = self._linear(fit.theta, names, slopes, r)
         starts = [fit.theta]
         if not self.problem.moves:  # and with what the mode of nothing has a little of beside it
             on, found = {key.rsplit(".", 1)[0] for key in fit.theta}, self.point.mode.theta.items()
             starts.append({k: v for k, v in found if k.rsplit(".", 1)[0] not in on} | fit.theta)
-        blocks = self.division.blocks
-        mode = mode_of(self.problem, hypothesis, starts, linear, slopes, blocks)
+        mode = mode_of(self.problem, hypothesis, starts, linear, slopes, self.blocks)
         score = self.ranker(mode.linear).score(hypothesis)
         return LinearisationPoint(hypothesis, fit, linear, windowed, mode, score)

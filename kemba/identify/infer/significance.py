@@ -8,12 +8,12 @@ against B is half of s^2 times the information about A that is left when B is fr
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse.csgraph import connected_components
-from scipy.special import log_ndtr, logsumexp
 
 from kemba.errors import enumerated
 from kemba.identify.answer import DiscoverSettings
@@ -90,9 +90,9 @@ def bootstrap(ranker: Ranker, noise: Array, effects: Sequence[str]) -> NullTest:
     k): J'e of short blocks of the error of a flexible model. A block keeps the colour of the
     noise; a random sign of each block makes new noise.
     """
-    slopes = _slopes(ranker, noise)
-    parts = [_evidence(ranker, effects, slopes, t) for t in SpikeSlabSettings.tolerances]
-    nothing, *single = logsumexp(parts, axis=0)
+    about = copy(ranker)  # the prior mean
+    about.linear = replace(ranker.linear, at=ranker.linear.mean)
+    nothing, *single = about.beside(NULL, effects, _slopes(ranker, noise))
     return NullTest(np.max(single - nothing, axis=0), ranker.linear.names, len(noise))
 
 
@@ -107,24 +107,6 @@ def _slopes(ranker: Ranker, noise: Array) -> Array:
         if not ranker.candidates[effect].lead.signed:
             truth[:, i] = np.abs(truth[:, i])
     return np.asarray((-(truth @ linear.gram.sum(axis=0)) + signs @ noise).T)
-
-
-def _evidence(ranker: Ranker, effects: Sequence[str], slopes: Array, tolerance: float) -> Array:
-    """Log evidence (1 + e, draws) of nothing and of each effect alone (Sherman, Morrison)."""
-    width, wide = (ranker.widths(h, tolerance) for h in ((), tuple(effects)))
-    lower = precision_factor(ranker.linear.gram.sum(axis=0), width)
-    root = solve_triangular(lower, np.diag(width), lower=True)
-    covariance = root.T @ root
-    step = -covariance @ slopes
-    nothing = -0.5 * np.sum(slopes * step, axis=0) - np.sum(np.log(np.diag(lower)))
-    i = [ranker.lead[e] for e in effects]
-    step, variance = step[i], covariance[i, i][:, None]
-    delta = (wide[i] ** -2.0 - width[i] ** -2.0)[:, None]
-    grows = 1.0 + variance * delta  # of precision
-    gain = -0.5 * (delta / grows * step**2 + np.log(grows)) - np.log(wide[i] / width[i])[:, None]
-    signed = [[ranker.candidates[e].lead.signed] for e in effects]
-    side = np.log(2.0) + log_ndtr(step / np.sqrt(variance * grows))
-    return np.vstack([nothing, nothing + gain + np.where(signed, 0.0, side)])
 
 
 def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | None]:
@@ -147,19 +129,17 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | N
     return found
 
 
-class LeftOutNoiseSettings:
-    """How much of the noise a fit may have taken for effects."""
-
-    # largest factor by which what is left of a block is enlarged: of what acts in one block only
-    # nobody can tell whether it is noise
-    most = 4.0
-    # of (I - H)^-1, by which what is left is enlarged; 1: errors of left-out data; 200 bench
-    # machines, whose noise then has 3.5 instead of 4.0 times its power
-    power = 1.0
-    # the same where the motion depends on the model; 0.5: power of white noise; robot logs with
-    # noise of 10 ms; with 1 hidden effects had p of 0.08 and 0.13, with 0.5 0.0025 to 0.012, logs
-    # of a clean robot 1.0 by both
-    power_in_motion = 0.5
+# How much of the noise a fit may have taken for effects.
+# largest factor by which what is left of a block is enlarged: of what acts in one block only
+# nobody can tell whether it is noise
+MOST = 4.0
+# of (I - H)^-1, by which what is left is enlarged; 1: errors of left-out data; 200 bench
+# machines, whose noise then has 3.5 instead of 4.0 times its power
+POWER = 1.0
+# the same where the motion depends on the model; 0.5: power of white noise; robot logs with
+# noise of 10 ms; with 1 hidden effects had p of 0.08 and 0.13, with 0.5 0.0025 to 0.012, logs
+# of a clean robot 1.0 by both
+POWER_IN_MOTION = 0.5
 
 
 def left_out_noise(
@@ -184,8 +164,7 @@ def _enlarged(own: Array, left: Array, root: Array, power: float) -> Array:
     """(I - H)^-power J'e (k,) of one block, by the directions of its share H in what is known."""
     seen = solve_triangular(root, own.T, lower=True)
     share, directions = np.linalg.eigh(seen @ seen.T)
-    most = LeftOutNoiseSettings.most
-    factor = np.clip(1.0 - share, 1.0 / most, 1.0) ** -power
+    factor = np.clip(1.0 - share, 1.0 / MOST, 1.0) ** -power
     return np.asarray(directions @ (factor * (directions.T @ (seen @ left))))
 
 
@@ -216,10 +195,10 @@ def null_test(search: Search) -> NullTest:
 def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
     leaves of the null's residual: noise for the bootstrap."""
-    problem, settings = search.problem, LeftOutNoiseSettings
+    problem = search.problem
     left = search.points[NULL].mode.residual + jacobian @ (linear.best() - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
-    power = settings.power_in_motion if problem.moves else settings.power
+    power = POWER_IN_MOTION if problem.moves else POWER
     return left_out_noise(jacobian, left, linear.width, blocks, power)
 
 

@@ -1,11 +1,11 @@
 """Evidence for "these effects are large and all others are small", by linear algebra."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from scipy.linalg import cho_solve
+from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from kemba.identify.infer.linear import Linear, precision_factor
@@ -116,46 +116,58 @@ class Ranker:
     def table(self, given: Hypothesis = ()) -> dict[Hypothesis, float]:
         """Log evidence of `given` with each further effect."""
         others = [name for name in sorted(self.candidates) if name not in given]
-        parts = [self._beside(given, others, t) for t in self._prior.tolerances]
-        total = logsumexp(parts, axis=0) - np.log(len(parts))
-        keys = (tuple(sorted((*given, other))) for other in others)
-        return dict(zip(keys, total.tolist(), strict=True))
+        _, *evidence = self.beside(given, others, self._slope[:, None])[:, 0].tolist()
+        return dict(zip((tuple(sorted((*given, e))) for e in others), evidence, strict=True))
 
-    def _beside(self, given: Hypothesis, others: list[str], tolerance: float) -> Array:
-        """Log evidence (o,) of `given` with each of the `others` (Sherman and Morrison)."""
+    def beside(self, given: Hypothesis, others: Sequence[str], slopes: Array) -> Array:
+        """Log evidence (1 + o, c) of `given`, and of it with each of the `others`, for c residuals
+        whose J'r are `slopes` (k, c); averaged as in `score`."""
+        parts = [self._beside(given, others, slopes, t) for t in self._prior.tolerances]
+        return np.asarray(logsumexp(parts, axis=0) - np.log(len(parts)))
+
+    def _beside(
+        self, given: Hypothesis, others: Sequence[str], slopes: Array, tolerance: float
+    ) -> Array:
+        """The same for figures off by `tolerance` prior sigmas (Sherman and Morrison)."""
         linear = self.linear
         width, wide = (self.widths(h, tolerance) for h in (given, tuple(self.candidates)))
         shift = linear.mean - linear.at
-        eta = shift / width**2 - self._slope
+        eta = (shift / width**2)[:, None] - slopes
         lower = precision_factor(self._gram, width)
-        root = np.linalg.solve(lower, np.diag(width))
+        root = solve_triangular(lower, np.diag(width), lower=True)
         covariance = root.T @ root
         step = covariance @ eta
-        i = np.array([self.lead[e] for e in others], dtype=int)
-        delta = wide[i] ** -2.0 - width[i] ** -2.0
-        push, variance = delta * shift[i], covariance[i, i]
+        i = np.array([0, *(self.lead[e] for e in others)])  # first: none of them
+        ratio = wide[i] / width[i]
+        ratio[0] = 1.0
+        delta = ((ratio**-2.0 - 1.0) / width[i] ** 2)[:, None]  # of precision
+        push, variance = delta * shift[i, None], covariance[i, i][:, None]
         share = delta / (1.0 + variance * delta)
         moved = step[i] + variance * push
-        fitted = eta @ step + push * (2.0 * step[i] + push * variance) - share * moved**2
-        quadratic = self._power + np.sum((shift / width) ** 2) + delta * shift[i] ** 2 - fitted
+        fitted = np.sum(eta * step, axis=0) + push * (2.0 * step[i] + push * variance)
+        fitted -= share * moved**2
+        quadratic = self._power + np.sum((shift / width) ** 2) + push * shift[i, None] - fitted
         log_det = 2.0 * np.sum(np.log(np.diag(lower))) + np.log1p(variance * delta)
-        evidence = -0.5 * (quadratic + log_det) - np.log(wide[i] / width[i])
-        for effects in ([e] * len(others) for e in given):
-            evidence += self._sides(effects, covariance, step, i, push - share * moved, share)
-        return np.asarray(
-            evidence + self._sides(others, covariance, step, i, push - share * moved, share)
-        )
+        evidence = -0.5 * (quadratic + log_det) - np.log(ratio)[:, None]
+        by = push - share * moved
+        for effect in given:
+            own = [effect] * len(i)
+            evidence += self._sides(own, covariance, step, i, by, share)
+        evidence[1:] += self._sides(others, covariance, step, i[1:], by[1:], share[1:])
+        return np.asarray(evidence)
 
     def _sides(
-        self, effects: list[str], covariance: Array, step: Array, i: Labels, by: Array, share: Array
-    ) -> Array:
-        """As `_sign_term` (o,), where the prior width of parameter `i` (o,) is another one."""
+        self, effects: Sequence[str], covariance: Array, step: Array, i: Labels, by: Array,
+        share: Array,
+    ) -> Array:  # fmt: skip
+        """As `_sign_term` (o, c), where the prior width of parameter `i` (o,) is another one."""
         leads = [self.candidates[e].lead for e in effects]
         j = np.array([self.lead[e] for e in effects], dtype=int)
-        along = covariance[j, i]
-        sd = np.sqrt(np.maximum(covariance[j, j] - share * along**2, 0.0))
-        z = self.linear.at[j] + step[j] + along * by - [lead.off for lead in leads]
-        return np.where([lead.signed for lead in leads], 0.0, np.log(2.0) + log_ndtr(z / sd))
+        along = covariance[j, i][:, None]
+        sd = np.sqrt(np.maximum(covariance[j, j][:, None] - share * along**2, 0.0))
+        z = self.linear.at[j, None] + step[j] + along * by - [[lead.off] for lead in leads]
+        signed = [[lead.signed] for lead in leads]
+        return np.where(signed, 0.0, np.log(2.0) + log_ndtr(z / sd))
 
 
 def log_prior(hypothesis: Hypothesis, count: int) -> float:

@@ -84,22 +84,20 @@ def _still(level: Labels) -> int:
     return int(np.argmax(moved)) if moved.any() else len(moved)
 
 
-class DriftColumnSettings:
-    """Drifts that any sensor may have."""
-
-    waves = 8  # cosines of a run: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s
-    size = 1.0  # sigma of a drift, in stated sigmas: as the noise
+# Drifts that any sensor may have.
+WAVES = 8  # cosines of a run: 92 to 99 % of the variance of a lag of 1 s in 0.5 to 4 s
+DRIFT = 1.0  # sigma of a drift, in stated sigmas: as the noise
 
 
 def drift_waves(time: Array) -> tuple[Array, Array]:
     """Cosines (n, d) of a run's rows at `time` (n,) [s], and the standard deviations (d,) that make
     a drift of them."""
     length = max(float(np.ptp(time)), 1e-9)
-    order = np.arange(float(DriftColumnSettings.waves))
+    order = np.arange(float(WAVES))
     memory = max(ColourSettings.drifts)  # of a lag of unit variance, which the cosines make
     variance = np.where(order == 0, 0.5, 1.0) / (1.0 + (np.pi * order * memory / length) ** 2)
     mean = variance @ np.where(order == 0, 1.0, 0.5)
-    sigmas = DriftColumnSettings.size * np.sqrt(variance / mean)
+    sigmas = DRIFT * np.sqrt(variance / mean)
     return np.cos(np.pi * np.outer((time - time[0]) / length, order)), np.asarray(sigmas)
 
 
@@ -143,13 +141,11 @@ AROUND = 151  # rows around a spike that it is compared with
 SPIKY = 5.0  # ratio of mean squares that makes a spike
 
 
-class WhiteNoiseSettings:
-    """How the white noise of a channel is told from its motion."""
-
-    fewest = 11  # values that are needed to tell noise
-    # share of the third differences that count as noise, the smallest ones: by hand; impacts and
-    # switching valves take less than a tenth of a log
-    kept = 0.9
+# How the white noise of a channel is told from its motion.
+FEWEST_VALUES = 11  # values that are needed to tell noise
+# share of the third differences that count as noise, the smallest ones: by hand; impacts and
+# switching valves take less than a tenth of a log
+KEPT = 0.9
 
 
 def difference_sigma(values: Array) -> float:
@@ -158,15 +154,14 @@ def difference_sigma(values: Array) -> float:
     From third differences, in which smooth motion cancels. The largest ones are left out: impacts
     and switching valves are no noise. A quantised channel is never better than its own steps.
     """
-    settings = WhiteNoiseSettings
     known = values[np.isfinite(values)]
-    if len(known) < settings.fewest:
+    if len(known) < FEWEST_VALUES:
         return 0.0
-    rough = np.sort(np.abs(np.diff(known, n=3)))[: int(settings.kept * (len(known) - 3))]
+    rough = np.sort(np.abs(np.diff(known, n=3)))[: int(KEPT * (len(known) - 3))]
     noise = float(np.sqrt(np.mean(rough**2) / 20.0))  # 20 = 1 + 9 + 9 + 1
-    normal, share = NormalDist(), settings.kept
-    end = normal.inv_cdf(0.5 * (1.0 + share))  # the smallest values of a normal have less spread
-    noise /= float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / share))
+    normal = NormalDist()
+    end = normal.inv_cdf(0.5 * (1.0 + KEPT))  # the smallest values of a normal have less spread
+    noise /= float(np.sqrt(1.0 - 2.0 * end * normal.pdf(end) / KEPT))
     return max(noise, step_of(known) / float(np.sqrt(12.0)))
 
 

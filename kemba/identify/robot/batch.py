@@ -19,7 +19,7 @@ from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS, SensorEffect, as_measured
 from kemba.effects.series import Series
 from kemba.identify.logs.reading import held
-from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
+from kemba.identify.problem.noise import FEWEST_VALUES, difference_sigma
 from kemba.identify.problem.problem import Array, Flags
 from kemba.trajectory import Trajectory
 
@@ -78,7 +78,7 @@ def resample(
 
 def _sigma(channel: str, values: Array) -> float:
     """Noise of one sample as its values tell, else the usual one."""
-    if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
+    if np.isfinite(values).sum() < FEWEST_VALUES:
         return CHANNELS[channel.split("/")[-1]][1]
     return max(difference_sigma(values), FINEST)
 

@@ -14,7 +14,8 @@ from kemba.identify.robot.filter import FilterGains, System, smooth
 from kemba.identify.robot.noise import Noise, coloured
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.reference import (
-    ContactForceSettings,
+    SLIPPING,
+    STOPPED,
     PlaceSettings,
     Reference,
     integrator,
@@ -95,10 +96,10 @@ def linearise_along(
     y, rate, Jy = (batch.deep(a) for a in physics.call("measured", *at_nodes, p=p))
     feet, feet_rate, Jf = (batch.deep(a) for a in physics.call("feet", *at_nodes, p=p))
     slip = batch.pad([x.slides for x in schedules], 0.0)
-    density, slipping = density.copy(), ContactForceSettings.slipping
+    density = density.copy()
     for leg in range(legs):  # a sliding foot pushes along the edge of its cone
         pushing = k + 2 * leg
-        density[..., pushing] = np.where(slip[..., leg] != 0.0, slipping, density[..., pushing])
+        density[..., pushing] = np.where(slip[..., leg] != 0.0, SLIPPING, density[..., pushing])
     Jf_force = Jf.copy()
     grip = physics.mechanism.scene.ground.friction(feet[..., 0::2], physics.grip)
     Jf_force[..., 1::2, :] -= (grip * slip)[..., None] * Jf[..., 0::2, :]
@@ -202,13 +203,12 @@ def _rigid_forces(
     channels: Array, density: Array, force: Array, k: int, legs: int
 ) -> tuple[Array, Flags]:
     """Forces (n, L, 3 legs) [N] of stops, then feet, of least norm, and where they act."""
-    settings = ContactForceSettings
     weighted = channels * density[..., None, :]
     S = weighted @ channels.swapaxes(-1, -2)
     S = S + 1e-9 * np.eye(k)
     share = (weighted.swapaxes(-1, -2) @ np.linalg.solve(S, force[..., None]))[..., 0]
     # along the ground a sliding foot has its friction: what is beyond that is an error to be seen
-    least = np.array([settings.stopped] * legs + [settings.slipping, 0.0] * legs)
+    least = np.array([STOPPED] * legs + [SLIPPING, 0.0] * legs)
     return share[..., k - legs :], density[..., k - legs :] > least
 
 

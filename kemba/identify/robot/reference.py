@@ -28,17 +28,15 @@ LOOSE = ForceDensity(0.05, 2e-3, 2e-3, 0.5)  # while the motion is smoothed: it 
 QUIET = ForceDensity(1e-5, 1e-6, 1e-6, 1e-5)  # as good as none: all that is unknown is missing
 
 
-class ContactForceSettings:
-    """Density of forces that are unknown in contact."""
-
-    contact = 300.0  # of a foot on the ground, a piston at a stop [N2.s]
-    impact = 3e4  # of an impact [N2.s]
-    slipping = 1.0  # of a sliding foot, beyond its friction [N2.s]
-    stopped = 50.0  # of a rod, above which its force is a stop's [N2.s]
-    edge = 8  # nodes that an impact at a stop lasts
-    air = 100.0  # of a rod where a log does not begin at rest [N2.s]
-    air_fades = 0.025  # time in which this fades [s]
-    rest = 5  # node of a log that tells whether it begins at rest
+# Density of forces that are unknown in contact.
+CONTACT = 300.0  # of a foot on the ground, a piston at a stop [N2.s]
+IMPACT = 3e4  # of an impact [N2.s]
+SLIPPING = 1.0  # of a sliding foot, beyond its friction [N2.s]
+STOPPED = 50.0  # of a rod, above which its force is a stop's [N2.s]
+EDGE = 8  # nodes that an impact at a stop lasts
+AIR = 100.0  # of a rod where a log does not begin at rest [N2.s]
+AIR_FADES = 0.025  # time in which this fades [s]
+REST = 5  # node of a log that tells whether it begins at rest
 
 
 class PlaceSettings:
@@ -145,20 +143,20 @@ def densities(
 
     `least`: density everywhere; contacts, impacts and stops add to it.
     """
-    legs, parts, unknown = len(physics.legs), [], ContactForceSettings
+    legs, parts = len(physics.legs), []
     for log, schedule in zip(batch.resampled, schedules, strict=True):
         own = [least.body, least.body, least.pitch] + [least.hip] * legs + [least.rod] * legs
         density = np.tile(np.array(own + [0.0] * 2 * legs), (len(log.time), 1))
         rods = density[:, 3 + legs : 3 + 2 * legs]
         stopped = schedule.low | schedule.high
-        rods += np.where(stopped, unknown.contact, 0.0)
-        rods += np.where(stopped & schedule.struck, unknown.impact, 0.0)
-        rods += np.where(first_nodes(stopped, unknown.edge), unknown.impact, 0.0)
-        if schedule.phase[min(unknown.rest, len(schedule.phase) - 1)] != "rest":
+        rods += np.where(stopped, CONTACT, 0.0)
+        rods += np.where(stopped & schedule.struck, IMPACT, 0.0)
+        rods += np.where(first_nodes(stopped, EDGE), IMPACT, 0.0)
+        if schedule.phase[min(REST, len(schedule.phase) - 1)] != "rest":
             since = (log.time - log.time[0])[:, None]
-            rods += unknown.air * np.exp(-2.0 * since / unknown.air_fades)
-        feet = np.where(schedule.foot, unknown.contact, 0.0)
-        feet = feet + np.where(schedule.struck, unknown.impact, 0.0)
+            rods += AIR * np.exp(-2.0 * since / AIR_FADES)
+        feet = np.where(schedule.foot, CONTACT, 0.0)
+        feet = feet + np.where(schedule.struck, IMPACT, 0.0)
         density[:, 3 + 2 * legs :] = np.repeat(feet, 2, axis=1)
         parts.append(density)
     return batch.pad(parts, 0.0)
