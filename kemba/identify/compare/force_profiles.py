@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array, ForceChannel, Problem
+from kemba.identify.problem.problem import Array, ForceChannel, Problem, Rows
 from kemba.units import short
 
 
@@ -139,6 +139,16 @@ def risen(times: Array, sizes: Array, at: Array) -> Array:
     total = np.concatenate([[0.0], np.cumsum(sizes)])
     level = total[np.searchsorted(times, at[:, None] - lags(), side="right")]
     return np.asarray(level[:, :-1] - level[:, 1:])
+
+
+def rises(problem: Problem, rows: Rows, command: str) -> Array:
+    """The same before every row (n, l) of a problem's logs; zero in runs without the command."""
+    found = np.zeros((len(rows), len(lags()) - 1))
+    for i, sent in enumerate(problem.commands()):
+        if command in sent:
+            own = rows.run == i
+            found[own] = risen(*sent[command], rows.time[own])
+    return found
 
 
 def bins(values: Array) -> Array | None:

@@ -13,7 +13,7 @@ from kemba.identify.compare.force_profiles import (
     ForceProfileSettings,
     lags,
     middle,
-    risen,
+    rises,
 )
 from kemba.identify.compare.words import command, quantity
 from kemba.identify.infer.spike_slab import SpikeSlabSettings
@@ -96,14 +96,9 @@ def after_commands(problem: Problem, rows: Rows, white: Array) -> list[Hint]:
     `white` (n,): residual with unit variance where the model is right. A command's rise within each
     lag is the regressor of every channel's error.
     """
-    runs, found = problem.commands(), []
-    names = sorted({n for run in runs for n in run})
+    found, names = [], sorted({n for run in problem.commands() for n in run})
     for name in names:
-        rise = np.zeros((len(rows), len(lags()) - 1))
-        for i, changes in enumerate(runs):
-            if name in changes:
-                own = rows.run == i
-                rise[own] = risen(*changes[name], rows.time[own])
+        rise = rises(problem, rows, name)
         z = np.zeros((len(rows.channels), rise.shape[1]))
         for k in range(len(z)):
             own = rows.channel == k
