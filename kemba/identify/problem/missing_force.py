@@ -105,23 +105,15 @@ def spans(time: Array, flags: Array) -> tuple[tuple[float, float], ...]:
 RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # reach of a force at an end of the stroke [m]
 
 
-def end_terms(x: Array, stroke: float) -> Iterator[tuple[str, Array]]:
-    """(formula, force per unit coefficient (...)) of forces near the ends of the stroke.
-
-    `x` (...) [m]: position of the piston; `stroke` [m].
-    """
-    for d in RANGES:
-        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
-        yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
-
-
 def rod_terms(
     x: Array, v: Array, stroke: float, creeps: Iterable[float]
 ) -> Iterator[tuple[str, Array]]:
     """(formula, force on a rod per unit coefficient (n, ...)) of its extension x (n, ...) [m] and
     rate v [m.s-1]; `stroke` [m]; `creeps` [m]: travels over which a hysteresis turns round."""
     sign = np.tanh(v / V_COULOMB)
-    yield from end_terms(x, stroke)
+    for d in RANGES:
+        yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
+        yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
     yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
     yield "max(v, 0)", np.maximum(v, 0.0)
     yield "v**3", v**3

@@ -18,12 +18,11 @@ from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.significance import (
     NullTest,
-    _evidence,
     best_gain,
     bootstrap,
     smallest_detectable,
 )
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.spike_slab import NULL, SpikeSlabSettings
 
 MACHINES = 200
 SIZE = 10.0  # N; the size of every effect of the toy
@@ -134,6 +133,7 @@ def test_what_simulated_logs_say_of_one_effect_is_what_the_ranking_says() -> Non
     hypotheses = ((), *((effect,) for effect in EFFECTS))
     found, expected = [], []
     for tolerance in SpikeSlabSettings.tolerances:
-        found.append(_evidence(ranker, list(EFFECTS), ranker._slope[:, None], tolerance)[:, 0])
+        slopes = ranker._slope[:, None]
+        found.append(ranker._beside(NULL, list(EFFECTS), slopes, tolerance)[:, 0])
         expected.append([ranker._score(h, tolerance).log_evidence for h in hypotheses])
     assert found - found[0][0] == pytest.approx(np.array(expected) - expected[0][0], abs=1e-6)
