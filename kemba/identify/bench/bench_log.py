@@ -16,15 +16,15 @@ from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.identify.logs.gate import ROW
 from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.logs.reading import held
-from kemba.identify.problem.noise import difference_sigma, telling
-from kemba.identify.problem.problem import Array, Flags
-from kemba.identify.problem.sensor_noise import (
+from kemba.identify.problem.noise import (
     ChannelNoise,
     ColourSettings,
-    Kind,
+    difference_sigma,
     learnt_noise,
     pairs,
+    telling,
 )
+from kemba.identify.problem.problem import Array, Flags
 from kemba.trajectory import Trajectory
 
 # How the velocity of an imposed motion is found.
@@ -153,7 +153,7 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     for i, (left, _) in enumerate(quiet):
         errors[: len(left), i, 0] = left
     step = float(np.median([step for _, step in quiet]))
-    made = {Kind(0, memory): _expected(memory, step) for memory in (0.0, *ColourSettings.memories)}
+    made = {(0, memory): _expected(memory, step) for memory in (0.0, *ColourSettings.memories)}
     return learnt_noise(errors, pairs(errors), made, np.array([MOST]))[0]
 
 

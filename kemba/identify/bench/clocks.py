@@ -5,14 +5,14 @@ the chambers then seem to fill later and later, as with a hose that grows. Such 
 before any fit, and the logs are put on one clock; what is left of the rate is a nuisance parameter.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog, SmoothedMotion
-from kemba.identify.infer.linear import condense, names_of, priors
+from kemba.identify.infer.linear import linearise, moved, priors
 from kemba.identify.logs.reading import GateSettings
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.trajectory import Trajectory
@@ -93,14 +93,14 @@ def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:
     The model with all effects free is linearised and fitted at every trial of a rate; where a rate
     does well it is linearised again, since slopes along a wrong motion may praise a wrong rate.
     """
-    at_zero = _Linearised(problem, {})
-    usual = at_zero.cost({})
-    if 2.0 * usual < FITS * at_zero.rows:
+    cost = _cost_about(problem, {})
+    usual = cost({})
+    if 2.0 * usual < FITS * len(problem.rows()):
         return None
     step = STRIDE / max(float(np.ptp(log.motion.time)) for log in logs)
     half = step * np.arange(1.0, FARTHEST / STRIDE + 0.5)
     costs = {
-        (owner, sign * rate): at_zero.cost(_theta(owner, sign * rate))
+        (owner, sign * rate): cost(_theta(owner, sign * rate))
         for owner in OWNERS
         for sign in (1.0, -1.0)
         for rate in (0.5 * step, *half.tolist())
@@ -120,26 +120,24 @@ def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:
     return (owner, rate) if inside and least < BETTER * usual else None
 
 
-class _Linearised:
-    """A problem linearised at theta, with every effect of the catalogue free."""
+def _cost_about(problem: Problem, theta: Theta) -> Callable[[Theta], float]:
+    """What the best fit leaves at any theta, every effect free, with the slopes at this one."""
+    blocks = np.zeros(len(problem.rows()), dtype=int)
+    linear, slopes, _ = linearise(problem, theta, blocks)
 
-    def __init__(self, problem: Problem, theta: Theta) -> None:
-        self.problem, self.names = problem, names_of(problem, {})
-        self.slopes = problem.jacobian(theta, self.names)
-        self.rows = len(self.slopes)
+    def cost(at: Theta) -> float:
+        z, *_ = priors(problem, at, linear.names)
+        there = moved(linear, z, slopes, problem.residual(at), blocks)
+        return there.cost(there.best())
 
-    def cost(self, theta: Theta) -> float:
-        """What the best fit about theta leaves."""
-        at, r = priors(self.problem, theta, self.names), self.problem.residual(theta)
-        linear = condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int))
-        return linear.cost(linear.best())
+    return cost
 
 
 def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[float, Drift]:
     """Cost and drift of the best rate near a good one, with the slopes there."""
-    near = _Linearised(problem, _theta(owner, rate))
+    near = _cost_about(problem, _theta(owner, rate))
     found = minimize_scalar(
-        lambda trial: near.cost(_theta(owner, trial)),
+        lambda trial: near(_theta(owner, trial)),
         bounds=(rate - 0.5 * step, rate + 0.5 * step),
         method="bounded",
         options={"xatol": 0.01 * step},

@@ -21,8 +21,7 @@ from kemba.identify.bench.bench_log import (
 from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, settle_starts, standardised
 from kemba.identify.bench.validate import contradictions, crossed
 from kemba.identify.compare.force_profiles import rises
-from kemba.identify.infer.linear import within
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.linear import SpikeSlabSettings, within
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
 from kemba.identify.problem.missing_force import missing_along, rod_terms
@@ -31,7 +30,7 @@ from kemba.identify.problem.problem import (
     Array,
     Changes,
     ForceChannel,
-    Leftover,
+    Labels,
     MissingForce,
     OperatingPoint,
     Rows,
@@ -277,7 +276,7 @@ class BenchProblem(ColouredProblem):
         peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
         return peak / FRICTION
 
-    def leftover(self, theta: Theta) -> Leftover:
+    def leftover(self, theta: Theta) -> tuple[Array, Array, Labels]:
         """Force residual over its noise and over what every model leaves, and what it may depend
         on."""
         parts = []
@@ -286,7 +285,7 @@ class BenchProblem(ColouredProblem):
             seen = features(*self._along(theta, i))
             parts.append((r, seen[log.keep[FORCE]], np.full(len(r), i)))
         residual, columns, run = (np.concatenate(p) for p in zip(*parts, strict=True))
-        return Leftover(residual, columns, run)
+        return residual, columns, run
 
     def _imperfection(self, index: int) -> Array:
         """Spread (n,), in noise units, of the force if every effect may be there a little."""

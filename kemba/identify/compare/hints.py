@@ -9,14 +9,14 @@ from scipy.special import chdtrc, ndtr, ndtri
 
 from kemba.identify.compare.bins import false_discoveries
 from kemba.identify.compare.force_profiles import (
+    PLAIN,
     ForceProfile,
-    ForceProfileSettings,
     lags,
     middle,
     rises,
 )
 from kemba.identify.compare.words import command, quantity
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.linear import SpikeSlabSettings
 from kemba.identify.infer.windows import codes
 from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Rows, Theta
 
@@ -82,9 +82,8 @@ class Hint:
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it explains enough."""
-    plain = ForceProfileSettings.plain
     best = max(found, key=lambda profile: profile.gain, default=None)
-    if best is None or best.gain <= plain or not best.largest:
+    if best is None or best.gain <= PLAIN or not best.largest:
         return []
     return [Hint("law", str(best), best.gain)]
 

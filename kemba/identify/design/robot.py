@@ -181,12 +181,12 @@ def _design_motion(
         tried = try_out(model, sway, rivals)
         if tried is None:
             continue
-        if tried.evidence.first == "":
+        if tried.first == "":
             return None
         standard = standard or tried
         found.append(tried)
-        found.sort(key=lambda t: -t.evidence.worth)
-        say(f"{count} motions tried; the best is worth {found[0].evidence.worth:.2f}")
+        found.sort(key=lambda t: -t.worth)
+        say(f"{count} motions tried; the best is worth {found[0].worth:.2f}")
     if standard is None:
         raise KembaError(model.name, "no sway that was tried is safe", "feet that stand, knees up")
     return standard, found, count
@@ -201,7 +201,8 @@ def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
     if not safe(model, done):
         return None
     log_s = float(done.time[-1] - done.time[0])  # the rest before it included
-    return Tried(sway, expected(model, done, rivals), log_s, done)
+    found = expected(model, done, rivals)
+    return Tried(found.first, found.nats, sway, log_s, done)
 
 
 def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.linear import Linear, precision_factor
+from kemba.identify.infer.linear import NULL, Hypothesis, Linear, precision_factor
 from kemba.identify.infer.null_model import LinearisationPoint, effect_bounds
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import START, error_ratio
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.infer.linear import Hypothesis, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Problem, bounded
 
 

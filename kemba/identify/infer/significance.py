@@ -17,38 +17,40 @@ from scipy.sparse.csgraph import connected_components
 
 from kemba.errors import enumerated
 from kemba.identify.answer import DiscoverSettings
-from kemba.identify.infer.linear import Linear, precision_factor, time_blocks
+from kemba.identify.infer.linear import (
+    NULL,
+    Linear,
+    Ranker,
+    SpikeSlabSettings,
+    precision_factor,
+    time_blocks,
+)
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Ranker, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Labels
 
-
-class BootstrapSettings:
-    """The test whether anything is missing."""
-
-    # number of simulated logs: twelve of them lie beyond the p-value asked for, so that it is known
-    # to a third
-    draws = 400
-    # share of simulated logs that reach a threshold by chance: one in fifty; stricter than
-    # DiscoverSettings.significant, since no left-out data are asked about formulas and detectable
-    # sizes
-    rare = 0.02
-    least = 1.0  # smallest threshold of the log evidence [nats]: evidence of one nat
-    # share of what the prior tells of an effect, below which data tell nothing of it: rounding
-    # alone leaves about 1e-10, as of a place along level ground
-    silent = 1e-6
+# The test whether anything is missing.
+# number of simulated logs: twelve of them lie beyond the p-value asked for, so that it is known
+# to a third
+DRAWS = 400
+# share of simulated logs that reach a threshold by chance: one in fifty; stricter than
+# DiscoverSettings.significant, since no left-out data are asked about formulas and detectable
+# sizes
+RARE = 0.02
+LEAST = 1.0  # smallest threshold of the log evidence [nats]: evidence of one nat
+# share of what the prior tells of an effect, below which data tell nothing of it: rounding
+# alone leaves about 1e-10, as of a place along level ground
+SILENT = 1e-6
 
 
 @dataclass(frozen=True)
 class NullTest:
     """The best score that a single effect reaches in logs in which nothing is missing.
 
-    `scores` (draws,): its log evidence less that of nothing [nats]. `names` of the parameters.
-    `blocks`: pieces of the logs whose signs were redrawn.
+    `scores` (draws,): its log evidence less that of nothing [nats]. `blocks`: pieces of
+    the logs whose signs were redrawn.
     """
 
     scores: Array
-    names: tuple[str, ...]
     blocks: int
 
     def p_value(self, score: float) -> float:
@@ -78,8 +80,7 @@ class NullTest:
     @property
     def threshold(self) -> float:
         """Log evidence that such logs reach rarely."""
-        settings = BootstrapSettings
-        return float(max(np.quantile(self.scores, 1.0 - settings.rare), settings.least))
+        return float(max(np.quantile(self.scores, 1.0 - RARE), LEAST))
 
 
 def bootstrap(ranker: Ranker, noise: Array, effects: Sequence[str]) -> NullTest:
@@ -93,15 +94,15 @@ def bootstrap(ranker: Ranker, noise: Array, effects: Sequence[str]) -> NullTest:
     about = copy(ranker)  # the prior mean
     about.linear = replace(ranker.linear, at=ranker.linear.mean)
     nothing, *single = about.beside(NULL, effects, _slopes(ranker, noise))
-    return NullTest(np.max(single - nothing, axis=0), ranker.linear.names, len(noise))
+    return NullTest(np.max(single - nothing, axis=0), len(noise))
 
 
 def _slopes(ranker: Ranker, noise: Array) -> Array:
     """J'r (k, draws) of logs in which nothing is missing, at the prior mean."""
-    linear, draws, rng = ranker.linear, BootstrapSettings.draws, np.random.default_rng(0)
-    signs = rng.choice([-1.0, 1.0], size=(draws, len(noise)))
-    tolerance = rng.choice(SpikeSlabSettings.tolerances, size=draws)
-    truth = rng.standard_normal((draws, len(linear.width))) * ranker.widths((), 1.0)
+    linear, rng = ranker.linear, np.random.default_rng(0)
+    signs = rng.choice([-1.0, 1.0], size=(DRAWS, len(noise)))
+    tolerance = rng.choice(SpikeSlabSettings.tolerances, size=DRAWS)
+    truth = rng.standard_normal((DRAWS, len(linear.width))) * ranker.widths((), 1.0)
     truth[:, ranker.figures] *= tolerance[:, None]
     for effect, i in ranker.lead.items():
         if not ranker.candidates[effect].lead.signed:
@@ -118,7 +119,7 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | N
         size = ranker.candidates[effect].lead.size
         wide, little = prior.slab * size, prior.spike * size
         told = 1.0 / covariance[i, i] - 1.0 / little**2
-        if told * wide**2 < BootstrapSettings.silent:
+        if told * wide**2 < SILENT:
             found[effect] = None
             continue
         variance = 1.0 / told

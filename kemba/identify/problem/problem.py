@@ -76,6 +76,10 @@ class Candidate:
         """Name of the switch in theta: `seal_friction.F_c`."""
         return f"{self.effect}.{self.lead.name}"
 
+    def is_on(self, theta: Theta) -> bool:
+        """Whether theta switches the effect on."""
+        return theta.get(self.key, self.lead.off) != self.lead.off
+
     def reported(self, parameter: Parameter) -> tuple[str, str]:
         """Name and unit of a parameter as the catalogue has it."""
         return self.reciprocal.get(parameter.name, (parameter.name, parameter.unit))
@@ -181,19 +185,6 @@ class MissingForce:
         return np.asarray(np.mean((self.force / self.sigma) ** 2, axis=0))
 
 
-@dataclass(frozen=True)
-class Leftover:
-    """What a fit leaves over, and what it may depend on.
-
-    `residual` (n,): in units of the noise, not whitened. `features` (n, m): quantities that a
-    missing force could be a function of. `run` (n,): index of each row's run.
-    """
-
-    residual: Array
-    features: Array
-    run: Labels
-
-
 NUISANCE = 0.5  # step of a nominal figure, in prior sigmas
 PARAMETER = 0.05  # step of a parameter that is on, as a share of its size or value
 ABSURD = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
@@ -284,7 +275,7 @@ class Problem(ABC):
             return
         candidate = self.candidates[name.rsplit(".", 1)[0]]
         parameter = candidate.keys()[name]
-        if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
+        if name == candidate.key and not candidate.is_on(theta):
             shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
             h = self._secant_step(parameter)
             for sign in (1.0, -1.0) if parameter.signed else (1.0,):
@@ -446,8 +437,10 @@ class Problem(ABC):
         practice. Default: infinite, so that every formula counts."""
         return math.inf
 
-    def leftover(self, theta: Theta) -> Leftover | None:
-        """What the model at theta leaves over, with what it may depend on; None: not known."""
+    def leftover(self, theta: Theta) -> tuple[Array, Array, Labels] | None:
+        """What the model at theta leaves over, in units of the noise and not whitened (n,), what a
+        missing force could be a function of (n, m), and the run of each row (n,). None: not known.
+        """
         return None
 
     # Gate

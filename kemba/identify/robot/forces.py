@@ -30,9 +30,8 @@ from kemba.identify.problem.problem import (
 )
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.filter import System, gains, smooth_with_band
-from kemba.identify.robot.linear import scatter
+from kemba.identify.robot.linear import GROUND, QUIET, densities, scatter
 from kemba.identify.robot.physics import Physics
-from kemba.identify.robot.reference import QUIET, PlaceSettings, densities
 from kemba.identify.robot.state import LinearisedState
 
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
@@ -51,7 +50,7 @@ def describe(state: LinearisedState) -> Rows:
     phase = np.full(shape[:2], "", dtype=object)
     for i, schedule in enumerate(state.schedules):
         phase[: len(schedule.phase), i] = schedule.phase
-    sigma = np.full(shape[1:], PlaceSettings.ground)
+    sigma = np.full(shape[1:], GROUND)
     sigma[:, : batch.sigma.shape[1]] = batch.sigma
     whole = {
         "run": np.arange(shape[1])[:, None],

@@ -9,34 +9,32 @@ from typing_extensions import Self
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
+    FIGURES,
+    FREE_THEN,
+    ORIFICE,
     extended,
+    free_figures,
     ground_of,
     in_the_air,
     robot_candidates,
     sensor_candidates,
+    with_orifices,
 )
 from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
-from kemba.identify.problem.structure import (
-    FIGURES,
-    FREE_THEN,
-    ORIFICE,
-    free_figures,
-    with_orifices,
-)
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
-from kemba.identify.robot.forces import RobotForces, describe
-from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
-from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
-from kemba.identify.robot.noise import (
+from kemba.identify.robot.filter import (
     Noise,
     expected_power,
     predicted_error,
     stated_noise,
     with_drifts,
 )
+from kemba.identify.robot.forces import RobotForces, describe
+from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
+from kemba.identify.robot.linear import ForceDensity, first_reference
+from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.physics import Physics
-from kemba.identify.robot.reference import ForceDensity, first_reference
 from kemba.identify.robot.state import learnt_from, linearise_at
 from kemba.identify.robot.validate import contradictions, mixed_commands, slightly_mixed_up
 from kemba.model.model import Model

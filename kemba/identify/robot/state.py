@@ -18,23 +18,31 @@ import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.problem.candidates import GRIP, SOFTNESS
+from kemba.identify.problem.noise import ChannelNoise
 from kemba.identify.problem.problem import Array, Flags, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
-from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole_rows
 from kemba.identify.robot.contact import ContactSchedule, loaded
-from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
-from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
-from kemba.identify.robot.noise import Noise, noise_behind
-from kemba.identify.robot.physics import Index, Physics
-from kemba.identify.robot.reference import (
+from kemba.identify.robot.filter import (
+    FilterGains,
+    Noise,
+    at_once,
+    gains,
+    innovations,
+    noise_behind,
+)
+from kemba.identify.robot.linear import (
     LOOSE,
     ForceDensity,
+    LinearisedMotion,
     Reference,
     densities,
     first_reference,
+    linearise_along,
     read_schedules,
+    smoothed,
 )
+from kemba.identify.robot.physics import Index, Physics
 
 
 def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
@@ -350,8 +358,21 @@ def linearise_at(
     on_time = (ahead(a, rate, batch.resampled, late - rows * dt) for a, rate in rates)
     reference = Reference(*on_time)  # as sensors that are not late would have seen it
     schedules = read_schedules(physics, batch, reference, p)
+
+    def along(unknown: ForceDensity) -> LinearisedState:
+        """The model at `base` linearised along the reference as it is now."""
+        delays = physics.timing(base)
+        states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
+        density = densities(physics, batch, schedules, unknown)
+        motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
+        mask = np.isfinite(motion.system.R)
+        mask[:LEAD_IN] = False
+        forces, gain = Forces(physics, batch, motion), gains(motion.system)
+        made = (schedules, motion, gain, mask, forces, noise)
+        return LinearisedState(physics, batch, sensors, dict(base), ground, *made)
+
     for _ in range(ROUNDS):
-        state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
+        state = along(LOOSE)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if sensors.present or any(map(is_fault, base)):  # as true sensors would have seen it
@@ -359,35 +380,10 @@ def linearise_at(
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
         del state  # its arrays make room for the next one's
-    state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown, noise)
+    state = along(unknown)
     links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in links}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
-
-
-def _along(
-    physics: Physics,
-    batch: Batch,
-    sensors: SensorFaults,
-    base: Theta,
-    ground: Mapping[str, float],
-    schedules: tuple[ContactSchedule, ...],
-    reference: Reference,
-    unknown: ForceDensity,
-    noise: Noise,
-) -> LinearisedState:
-    """The model at `base` linearised along one reference."""
-    p, delays = physics.at(base), physics.timing(base)
-    states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
-    density = densities(physics, batch, schedules, unknown)
-    motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
-    mask = np.isfinite(motion.system.R)
-    mask[:LEAD_IN] = False
-    forces = Forces(physics, batch, motion)
-    gain = gains(motion.system)
-    return LinearisedState(
-        physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces, noise
-    )
 
 
 def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:

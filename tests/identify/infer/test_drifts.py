@@ -11,8 +11,8 @@ from twin.measure import Sensors
 
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.infer.formula import Formula, drift_columns, look
+from kemba.identify.infer.linear import NULL
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL
 from kemba.identify.logs.reading import read_logs
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

@@ -14,6 +14,7 @@ from scipy.stats import kstest, norm
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
+from kemba.identify.infer.linear import NULL, SpikeSlabSettings
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.significance import (
@@ -22,7 +23,6 @@ from kemba.identify.infer.significance import (
     bootstrap,
     smallest_detectable,
 )
-from kemba.identify.infer.spike_slab import NULL, SpikeSlabSettings
 
 MACHINES = 200
 SIZE = 10.0  # N; the size of every effect of the toy
@@ -93,7 +93,7 @@ def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:
 def test_what_chance_does_as_often_is_not_believed() -> None:
     """The search names an effect; every simulated log looks better."""
     found = search(a=3.0)
-    p_value = NullTest(np.full(99, 50.0), (), 40).p_value(best_gain(found))
+    p_value = NullTest(np.full(99, 50.0), 40).p_value(best_gain(found))
     assert selected(found, ("a",), p_value) == Selection()
 
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from kemba.identify.problem.sensor_noise import (
+from kemba.identify.problem.noise import (
     ChannelNoise,
     ColourSettings,
-    Kind,
     chosen_noise,
 )
 
@@ -19,7 +18,7 @@ def learnt(noise: ChannelNoise, most: float, rows: float = 2000.0) -> ChannelNoi
     apart = 1e-3 * np.array(settings.lags)
     memories = (0.0, *settings.memories, *settings.drifts)
     kinds = {m: ChannelNoise(0.0, ((1.0, m),)) if m else ChannelNoise() for m in memories}
-    made = {Kind(0, m): kind.covariance(apart)[None, :] for m, kind in kinds.items()}
+    made = {(0, m): kind.covariance(apart)[None, :] for m, kind in kinds.items()}
     measured = noise.covariance(apart)[None, :]
     counts = np.full(measured.shape, rows)
     return chosen_noise(made, measured, counts, np.array([most]), np.array([True]))[0]

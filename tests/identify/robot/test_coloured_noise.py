@@ -11,8 +11,8 @@ from twin import catalogue, measure
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
 from kemba.identify.infer.null_model import STRONG, log_likelihood, with_learnt_colour
-from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.identify.robot.noise import coloured, simulated
+from kemba.identify.problem.noise import ChannelNoise
+from kemba.identify.robot.filter import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

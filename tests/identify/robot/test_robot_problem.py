@@ -12,7 +12,7 @@ from twin import catalogue, measure
 
 from kemba.identify.logs.reading import thinned
 from kemba.identify.problem.problem import Problem
-from kemba.identify.robot.noise import predicted_error
+from kemba.identify.robot.filter import predicted_error
 from kemba.identify.robot.problem import PREDICTED, RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
