@@ -174,7 +174,7 @@ class RobotProblem(RobotForces):
         return self.state.pick(self.state.residuals([theta]))[:, 0]
 
     def each_residual(self, thetas: Sequence[Theta]) -> Iterator[Array]:
-        """The same at each theta; the filter takes them side by side."""
+        """The same (n,) at each theta in turn; the filter takes them side by side."""
         return self.state.each_residual(thetas)
 
     def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:

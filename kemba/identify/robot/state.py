@@ -120,16 +120,6 @@ def _at(time: Array, values: Array, times: Array) -> Array:
 
 
 KEPT = 4  # inputs and states that are kept beside the first ones
-LINES = 50_000_000  # bytes of forces that are kept: the next Jacobian asks for them
-
-
-@dataclass
-class ForceLine:
-    """Force (N, k) at p, and its slopes (N, k) along parameters in which it is linear."""
-
-    p: Array
-    force: Array
-    slopes: dict[int, Array] = field(default_factory=dict)
 
 
 class Forces:
@@ -140,11 +130,12 @@ class Forces:
         self.physics, self.batch, self.motion = physics, batch, motion
         self._inputs: dict[bytes, list[Inputs]] = {}
         self._states: dict[bytes, tuple[Array, Array]] = {}
-        self._lines: dict[bytes, ForceLine] = {}
 
     def at(self, p: Array, delays: Array) -> Array:
         """Force (n, L, k) that the motion needs beyond model and contact."""
-        return self.batch.deep(self._force(p, delays)) - self.motion.contact
+        states = self.states(p, delays, self.physics.states_at(p))
+        force = self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
+        return self.batch.deep(force) - self.motion.contact
 
     def slopes(self, p: Array, delays: Array) -> Array:
         """d force / dp (N, k, len(p)) at the samples."""
@@ -160,38 +151,15 @@ class Forces:
             given = self._inputs.get(delays.tobytes())
             if given is None:
                 given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-                _keep(self._inputs, delays.tobytes(), given, KEPT)
+                _keep(self._inputs, delays.tobytes(), given)
             states, inputs = air_states(self.physics, self.batch, given, p, among)
-            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)), KEPT)
+            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)))
         return self._states[key]
 
-    def _force(self, p: Array, delays: Array) -> Array:
-        straight, crossed = self.physics.straight
-        key = delays.tobytes() + p[~straight].tobytes()
-        line = self._lines.get(key)
-        if line is None:
-            line = ForceLine(p.copy(), self._exact(p, delays))
-            _keep(self._lines, key, line, max(KEPT, LINES // line.force.nbytes))
-        moved = np.flatnonzero(p != line.p)
-        if crossed[np.ix_(moved, moved)].any():
-            return self._exact(p, delays)
-        force = line.force
-        for i in moved.tolist():
-            if i not in line.slopes:
-                one = line.p.copy()
-                one[i] += 1.0
-                line.slopes[i] = self._exact(one, delays) - line.force
-            force = force + (p[i] - line.p[i]) * line.slopes[i]
-        return force
 
-    def _exact(self, p: Array, delays: Array) -> Array:
-        states = self.states(p, delays, self.physics.states_at(p))
-        return self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
-
-
-def _keep(store: dict[bytes, Any], key: bytes, value: Any, most: int) -> None:
-    """Add to a store that holds the first one and the last ones, `most` of them."""
-    if len(store) > most:
+def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:
+    """Add to a store that holds the first one and the last few."""
+    if len(store) > KEPT:
         del store[list(store)[1]]
     store[key] = value
 
@@ -227,8 +195,6 @@ class LinearisedState:
     forces: Forces
     noise: Noise = ()
     linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
-    # what was `seen` with the lengths asked for last: a column of slopes seldom changes them
-    _last_seen: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
@@ -247,14 +213,10 @@ class LinearisedState:
         p, at, own = self.physics.at(theta), self.physics.at(self.base), self.physics.lengths
         if np.array_equal(p[own], at[own]):
             return self.motion.y, self.motion.places
-        key = p[own].tobytes()
-        if key not in self._last_seen:
-            nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
-            y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
-            stops = y[..., y.shape[2] - len(self.physics.legs) :]
-            self._last_seen.clear()
-            self._last_seen[key] = y, np.concatenate([feet, stops], axis=2)
-        return self._last_seen[key]
+        nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
+        y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
+        stops = y[..., y.shape[2] - len(self.physics.legs) :]
+        return y, np.concatenate([feet, stops], axis=2)
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
