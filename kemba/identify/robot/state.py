@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -119,7 +118,7 @@ def _at(time: Array, values: Array, times: Array) -> Array:
     return np.asarray(values[right - 1] + share * (values[right] - values[right - 1]))
 
 
-KEPT = 4  # inputs and states that are kept beside the first ones
+KEPT = 4  # states that are kept beside the first ones
 
 
 class Forces:
@@ -128,7 +127,6 @@ class Forces:
 
     def __init__(self, physics: Physics, batch: Batch, motion: LinearisedMotion) -> None:
         self.physics, self.batch, self.motion = physics, batch, motion
-        self._inputs: dict[bytes, list[Inputs]] = {}
         self._states: dict[bytes, tuple[Array, Array]] = {}
 
     def at(self, p: Array, delays: Array) -> Array:
@@ -148,20 +146,12 @@ class Forces:
         wanted = b"" if among is None else among.tobytes()
         key = delays.tobytes() + p[self.physics.moves].tobytes() + wanted
         if key not in self._states:
-            given = self._inputs.get(delays.tobytes())
-            if given is None:
-                given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-                _keep(self._inputs, delays.tobytes(), given)
+            if len(self._states) > KEPT:
+                del self._states[list(self._states)[1]]
+            given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
             states, inputs = air_states(self.physics, self.batch, given, p, among)
-            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)))
+            self._states[key] = self.batch.flat(states), self.batch.flat(inputs)
         return self._states[key]
-
-
-def _keep(store: dict[bytes, Any], key: bytes, value: Any) -> None:
-    """Add to a store that holds the first one and the last few."""
-    if len(store) > KEPT:
-        del store[list(store)[1]]
-    store[key] = value
 
 
 ROUNDS = 2  # times that the motion is smoothed with the model
