@@ -1,7 +1,7 @@
 """From a problem to an answer: search for effects, then doubt what was found."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,10 +58,9 @@ from kemba.identify.infer.verdict import (
 )
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
+from kemba.stopwatch import Tell, silent
 
 WRITTEN = ("missing", "partly")  # verdicts that give a model
-
-Talk = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def discover(
     problem: Problem,
     holdout: Problem | None = None,
     time_limit: float = np.inf,
-    say: Talk = lambda text: None,
+    say: Tell = silent,
 ) -> Discovery:
     """Which effect is missing from the model behind `problem`, if any.
 

@@ -40,6 +40,7 @@ from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.rigs import CourseRig, DynamometerRig, LockedRig, RandomRig, Rig, Test
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 
@@ -211,10 +212,7 @@ def _plain() -> Iterator[Array]:
 
 
 def _best_point(
-    worth: Callable[[Array], float],
-    begin: Array,
-    say: Callable[[str], None] = lambda text: None,
-    bounded: bool = True,
+    worth: Callable[[Array], float], begin: Array, say: Tell, bounded: bool
 ) -> tuple[Array, int]:
     """The point (k,) of the unit cube worth most in a search from `begin` (m, k); tries."""
     settings, started = DesignSearchSettings, time.monotonic()
@@ -284,7 +282,7 @@ class RigDesign(Proposal):
 def design_rig_test(
     model: Model,
     rivals: Rivals,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     bounded: bool = True,
 ) -> RigDesign | None:
     """The test of the piston of `model` that tells the rivals apart best; `bounded`: in about a
@@ -334,7 +332,7 @@ def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedTest:
 def propose(
     folder: str | Path,
     out: Path,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     bounded: bool = True,
 ) -> RigDesign:
     """The test of a rig that best tells the possible effects of an answer in `folder` apart, a YAML

@@ -8,7 +8,7 @@ times, and planning finds the torques.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.controller import PERIOD, execute
 from kemba.plant.repeat import Sensors, take_log
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 # What a robot may do in a designed motion.
@@ -151,10 +152,7 @@ class Tried(JudgedTest):
 
 
 def _design_motion(
-    model: Model,
-    rivals: Rivals,
-    say: Callable[[str], None] = lambda text: None,
-    bounded: bool = True,
+    model: Model, rivals: Rivals, say: Tell, bounded: bool
 ) -> tuple[Tried, list[Tried], int] | None:
     """The standard sway, all safe ones, the best first, and how many were simulated."""
     if len(model.mechanism.legs) < 2:
@@ -296,7 +294,7 @@ class MotionProposal(Proposal):
 def propose_motion(
     folder: str | Path,
     out: Path,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     bounded: bool = True,
 ) -> MotionProposal:
     """The safe motion that best tells the possible effects of an answer apart, a task in `out`.

@@ -1,7 +1,7 @@
 """The search: fit of the null, ranking, refits of the leaders, further effects one by one."""
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +17,7 @@ from kemba.identify.infer.linear import (
 from kemba.identify.infer.null_model import Baseline, LinearisationPoint, with_learnt_colour
 from kemba.identify.infer.refit import Fit, Frozen, refit
 from kemba.identify.problem.problem import Problem, Theta
-from kemba.stopwatch import Stage
+from kemba.stopwatch import Stage, Tell, silent
 
 # Which hypotheses are refitted.
 LEADERS = 6  # effects that are refitted in a round
@@ -58,7 +58,7 @@ class Search:
 
     problem: Problem
     deadline: float = np.inf
-    say: Callable[[str], None] = lambda text: None
+    say: Tell = silent
     points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
     begin: Mapping[str, float] = field(default_factory=dict)
     due: float = np.inf

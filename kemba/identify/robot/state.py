@@ -119,41 +119,6 @@ def _at(time: Array, values: Array, times: Array) -> Array:
 
 
 KEPT = 4  # states that are kept beside the first ones
-
-
-class Forces:
-    """Force that a motion needs beyond the model, at any parameters p (k,) and delays (valves, 2)
-    [s]."""
-
-    def __init__(self, physics: Physics, batch: Batch, motion: LinearisedMotion) -> None:
-        self.physics, self.batch, self.motion = physics, batch, motion
-        self._states: dict[bytes, tuple[Array, Array]] = {}
-
-    def at(self, p: Array, delays: Array) -> Array:
-        """Force (n, L, k) that the motion needs beyond model and contact."""
-        states = self.states(p, delays, self.physics.states_at(p))
-        force = self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
-        return self.batch.deep(force) - self.motion.contact
-
-    def slopes(self, p: Array, delays: Array) -> Array:
-        """d force / dp (N, k, len(p)) at the samples."""
-        given = (*self.motion.middle, *self.states(p, delays, None))
-        return self.physics.call("by_parameter", *given, p=p)[0]
-
-    def states(self, p: Array, delays: Array, among: Index | None) -> tuple[Array, Array]:
-        """Effect states (N, ns) and inputs (N, nu) at the samples; `among`: states that are asked
-        for (None: all)."""
-        wanted = b"" if among is None else among.tobytes()
-        key = delays.tobytes() + p[self.physics.moves].tobytes() + wanted
-        if key not in self._states:
-            if len(self._states) > KEPT:
-                del self._states[list(self._states)[1]]
-            given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-            states, inputs = air_states(self.physics, self.batch, given, p, among)
-            self._states[key] = self.batch.flat(states), self.batch.flat(inputs)
-        return self._states[key]
-
-
 ROUNDS = 2  # times that the motion is smoothed with the model
 LEAD_IN = 4  # nodes at the start that only tell where a run begins
 
@@ -167,10 +132,9 @@ class LinearisedState:
 
     `sensors`: what sensors make of the motion. `schedules`: contacts of each run. `motion`: the
     reference, and the model linearised along it. `gain`: gains of the filter. `mask` (n, L, m):
-    rows that are data. `forces`: the model's force along the motion at any parameters. `linear`:
-    name -> generalised force (n, L, k) per unit of a parameter that stands beside the model, and
-    its nominal value. `ground`: parameters of the model's soft ground, empty where it is rigid.
-    `noise` of the sensors, as it is coloured; empty: white.
+    rows that are data. `linear`: name -> generalised force (n, L, k) per unit of a parameter that
+    stands beside the model, and its nominal value. `ground`: parameters of the model's soft ground,
+    empty where it is rigid. `noise` of the sensors, as it is coloured; empty: white.
     """
 
     physics: Physics
@@ -182,9 +146,9 @@ class LinearisedState:
     motion: LinearisedMotion
     gain: FilterGains
     mask: Flags
-    forces: Forces
     noise: Noise = ()
     linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
+    _states: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
@@ -210,9 +174,25 @@ class LinearisedState:
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
-        force = self.forces.at(self.physics.at(theta), self.physics.timing(theta))
+        p, delays = self.physics.at(theta), self.physics.timing(theta)
+        states = self.states(p, delays, self.physics.states_at(p))
+        samples = self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
+        force = self.batch.deep(samples) - self.motion.contact
         beside = [theta.get(name, nominal) - nominal for name, (_, nominal) in self.linear.items()]
         return self.motion.defect(force + self._columns @ beside if any(beside) else force)
+
+    def states(self, p: Array, delays: Array, among: Index | None) -> tuple[Array, Array]:
+        """Effect states (N, ns) and inputs (N, nu) at the samples, at parameters p (k,) and delays
+        (valves, 2) [s]; `among`: states that are asked for (None: all)."""
+        wanted = b"" if among is None else among.tobytes()
+        key = delays.tobytes() + p[self.physics.moves].tobytes() + wanted
+        if key not in self._states:
+            if len(self._states) > KEPT:
+                del self._states[list(self._states)[1]]
+            given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
+            states, inputs = air_states(self.physics, self.batch, given, p, among)
+            self._states[key] = self.batch.flat(states), self.batch.flat(inputs)
+        return self._states[key]
 
     @cached_property
     def _columns(self) -> Array:
@@ -223,8 +203,9 @@ class LinearisedState:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
         if not names:
             return
-        physics = self.physics
-        slopes = self.forces.slopes(physics.at(theta), physics.timing(theta))
+        physics, p = self.physics, self.physics.at(theta)
+        given = (*self.motion.middle, *self.states(p, physics.timing(theta), None))
+        slopes = physics.call("by_parameter", *given, p=p)[0]
         place = {n: i for i, n in enumerate(physics.names)}
         for part in at_once(len(names)):
             forces = (
@@ -256,8 +237,7 @@ class LinearisedState:
 
     def commanded(self, batch: Batch) -> Array:
         """Whitened residual (rows,) at the base if the commands had been those of `batch`."""
-        forces = Forces(self.physics, batch, self.motion)
-        found = replace(self, batch=batch, forces=forces).residuals([self.base])
+        found = replace(self, batch=batch, _states={}).residuals([self.base])
         return self.pick(found)[:, 0]
 
     def with_noise(self, noise: Noise) -> LinearisedState:
@@ -319,8 +299,7 @@ def linearise_at(
         motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
         mask = np.isfinite(motion.system.R)
         mask[:LEAD_IN] = False
-        forces, gain = Forces(physics, batch, motion), gains(motion.system)
-        made = (schedules, motion, gain, mask, forces, noise)
+        made = (schedules, motion, gains(motion.system), mask, noise)
         return LinearisedState(physics, batch, sensors, dict(base), ground, *made)
 
     for _ in range(ROUNDS):

@@ -140,7 +140,7 @@ def test_denser_rows_are_thinned_and_sparse_ones_bridged() -> None:
 
 def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> None:
     """No effect with a memory, and each by itself."""
-    physics, forces = clean.physics, clean.state.forces
+    physics, state = clean.physics, clean.state
     delays = np.zeros((2 * len(physics.legs), 2))
     sizes = {c.key: c.lead.off + c.lead.size for c in clean.candidates.values()}
     switches = [physics.names[i] for i in physics._switches]
@@ -151,8 +151,8 @@ def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> N
             p[physics.names.index(name)] = sizes[name]
         few = physics.states_at(p)
         few_force, whole = (
-            physics.call("residual", *clean.state.motion.middle, *states, p=p)[0]
-            for states in (forces.states(p, delays, few), forces.states(p, delays, None))
+            physics.call("residual", *state.motion.middle, *states, p=p)[0]
+            for states in (state.states(p, delays, few), state.states(p, delays, None))
         )
         assert few_force == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
     assert len(physics.states_at(physics.nominal)) < physics.states.count
