@@ -37,7 +37,6 @@ class ForceDensity:
 LOOSE = ForceDensity(0.05, 2e-3, 2e-3, 0.5)  # while the motion is smoothed: it follows the data
 QUIET = ForceDensity(1e-5, 1e-6, 1e-6, 1e-5)  # as good as none: all that is unknown is missing
 
-
 # Density of forces that are unknown in contact.
 CONTACT = 300.0  # of a foot on the ground, a piston at a stop [N2.s]
 IMPACT = 3e4  # of an impact [N2.s]
@@ -47,7 +46,6 @@ EDGE = 8  # nodes that an impact at a stop lasts
 AIR = 100.0  # of a rod where a log does not begin at rest [N2.s]
 AIR_FADES = 0.025  # time in which this fades [s]
 REST = 5  # node of a log that tells whether it begins at rest
-
 
 # Places that stand still: of feet on the ground, of pistons at their stops.
 GROUND = 1e-4  # noise of a standing foot's place [m]
@@ -60,7 +58,6 @@ FREE = 1.0  # wander of a free foot's place [m.s-1/2]: no hold
 POSITION = 0.03  # prior sigma of a deviation from the reference [m, rad]: no knowledge
 VELOCITY = 3.0  # prior sigma of its rate [m.s-1, rad.s-1]: no knowledge
 THINNEST = 0.5  # smallest factor by which a yielding ground stiffens: stays positive
-
 
 # Smoothing of every coordinate for itself: density of its acceleration, of the body along the rail
 # [m2.s-3], its height and its pitch [rad2.s-3], of a hip and a knee [rad2.s-3].

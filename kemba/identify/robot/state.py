@@ -65,50 +65,33 @@ def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     return times, valves, index[: len(log.time)]
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """One run cut at every switching.
-
-    `h` (N,) [s]: steps of the integration; `given`: q, v and inputs (N, .) over them; `index` (n,)
-    of each node among them; `width` (n,) [s] of each node's step.
-    """
-
-    h: Array
-    given: tuple[Array, Array, Array]
-    index: Index
-    width: Array
-
-    def means(self, values: Array) -> Array:
-        """(n, k): values (N, k) averaged over the step from each node."""
-        padded = np.append(values * self.h[:, None], 0 * values[:1], axis=0)
-        sums = np.add.reduceat(padded, self.index, axis=0)
-        return np.vstack([(sums / self.width[:, None])[:-1], values[-1:]])
-
-
-def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
-    """Per run; `delays` (valves, 2) in seconds to switching on and off."""
-    found = []
+def air_states(
+    physics: Physics,
+    batch: Batch,
+    ref: Reference,
+    delays: Array,
+    p: Array,
+    among: Index | None = None,
+) -> tuple[Array, Array]:
+    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `delays`
+    (valves, 2) in seconds to switching on and off; `among`: states that are asked for (None:
+    all)."""
+    found: tuple[list[Array], list[Array]] = [], []
     for i, log in enumerate(batch.resampled):
         n = len(log.time)
-        times, valves, index = substeps(log, delays)
+        times, valves, index = substeps(log, delays)  # the run cut at every switching
         h = np.diff(times)
         middle = 0.5 * (times[1:] + times[:-1])
         q, v = (_at(log.time, a[:n, i], middle) for a in (ref.q, ref.v))
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves).T
-        width = np.append(np.diff(log.time), 1.0)
-        found.append(Inputs(h, (q, v, u), index, width))
-    return found
-
-
-def air_states(
-    physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array, among: Index | None = None
-) -> tuple[Array, Array]:
-    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `among`: states
-    that are asked for (None: all)."""
-    moving = p[physics.moves]
-    states = [d.means(physics.states.run(d.h, *d.given, moving, among)) for d in inputs]
-    return batch.pad(states, 0.0), batch.pad([d.means(d.given[2]) for d in inputs], 0.0)
+        width = np.append(np.diff(log.time), 1.0)[:, None]
+        states = physics.states.run(h, q, v, u, p[physics.moves], among)
+        for store, values in zip(found, (states, u), strict=True):
+            padded = np.append(values * h[:, None], 0 * values[:1], axis=0)
+            sums = np.add.reduceat(padded, index, axis=0)
+            store.append(np.vstack([(sums / width)[:-1], values[-1:]]))
+    return batch.pad(found[0], 0.0), batch.pad(found[1], 0.0)
 
 
 def _at(time: Array, values: Array, times: Array) -> Array:
@@ -189,9 +172,8 @@ class LinearisedState:
         if key not in self._states:
             if len(self._states) > KEPT:
                 del self._states[list(self._states)[1]]
-            given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-            states, inputs = air_states(self.physics, self.batch, given, p, among)
-            self._states[key] = self.batch.flat(states), self.batch.flat(inputs)
+            found = air_states(self.physics, self.batch, self.motion.ref, delays, p, among)
+            self._states[key] = self.batch.flat(found[0]), self.batch.flat(found[1])
         return self._states[key]
 
     @cached_property
@@ -294,7 +276,7 @@ def linearise_at(
     def along(unknown: ForceDensity) -> LinearisedState:
         """The model at `base` linearised along the reference as it is now."""
         delays = physics.timing(base)
-        states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
+        states = air_states(physics, batch, reference, delays, p)
         density = densities(physics, batch, schedules, unknown)
         motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
         mask = np.isfinite(motion.system.R)
