@@ -46,8 +46,8 @@ SILENT = 1e-6
 class NullTest:
     """The best score that a single effect reaches in logs in which nothing is missing.
 
-    `scores` (draws,): its log evidence less that of nothing [nats]. `blocks`: pieces of
-    the logs whose signs were redrawn.
+    `scores` (draws,): its log evidence less that of nothing [nats]. `blocks`: pieces of the logs
+    whose signs were redrawn.
     """
 
     scores: Array

@@ -148,11 +148,11 @@ def fitted_errors(search: Search, best: Hypothesis) -> tuple[float, ...]:
 SENSOR, MOTOR = (-0.2, 0.2), (0.5, 2.0)
 DRIVEN = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}
 PLATE = 3.0  # factor by which no figure of a rig is off: feet for metres are 3.28
+HEAVY = 10.0  # inertia that was forgotten, over the one that is known: gears and rotors have less
 OF_RIG = (
     "{} would be {:.3g} times what the rig is said to have; the unit of a channel is wrong "
     "(--map), or the rig's figures in the model"
 )
-HEAVY = 10.0  # inertia that was forgotten, over the one that is known: gears and rotors have less
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ FIGURES = {  # as a model that has orifice chambers calls them: as the candidate
 FREE_THEN = ("supply_scale", "rise_time_scale")
 OWN = {"P_e": "P_e_orifice", "P_r": "P_r_orifice"}  # states beside those of the model's chambers
 
-# How far the figures of orifice chambers may be from the usual ones: 1 sigma of their.
+# How far the figures of orifice chambers may be from the usual ones: 1 sigma of their logarithm.
 AREA = 0.2  # of an orifice's area
 VOLUME = 0.3  # of a dead volume
 # of the pressure that reaches the valves: the size of `supply_scale`, which it stands for

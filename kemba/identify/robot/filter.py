@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from kemba.identify.problem.noise import (
     ChannelNoise,
@@ -223,7 +224,7 @@ def simulated(system: System, draws: int, rng: np.random.Generator) -> Array:
 # differences of rows: third differences show a tenth of AR(1) noise of 0.98 per row
 STATED, GUESSED = 1.5, 10.0
 DRAWS = 6  # simulated logs
-WIDTH = 21  # nodes over which the power is averaged; odd
+WIDTH = 21  # nodes over which the power is averaged
 LEAST = 0.02  # smallest power
 
 
@@ -236,10 +237,7 @@ def expected_power(system: System, gain: FilterGains) -> Array:
     rng = np.random.default_rng(0)
     y = simulated(system, DRAWS, rng)
     power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
-    padded = np.pad(power, ((WIDTH // 2, WIDTH // 2), (0, 0), (0, 0)), mode="edge")
-    total = np.cumsum(padded, axis=0)
-    total = np.concatenate([np.zeros((1, *total.shape[1:])), total])
-    return np.asarray(np.maximum((total[WIDTH:] - total[:-WIDTH]) / WIDTH, LEAST))
+    return np.asarray(np.maximum(uniform_filter1d(power, WIDTH, 0, mode="nearest"), LEAST))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:
