@@ -129,13 +129,7 @@ def with_learnt_colour(
     """
     if not problem.learns_colour:
         return problem
-    plain = problem.recolour(None)
-    blocks = time_blocks(plain) if blocks is None else blocks
-    linear, jacobian, _ = linearise(plain, theta, blocks)
-    on = tuple(n for n, c in plain.candidates.items() if c.is_on(theta))
-    mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
-    left = mode.residual + jacobian @ (mode.linear.best() - mode.linear.at)
-    found = plain.recolour(left, careful=careful)
+    found, _ = learnt_colour(problem, theta, blocks, careful)
     blamed = any(moves_readings(n) for n in theta if n not in problem.nuisance)
     return _with_drift(found, theta) if careful and (blamed or not problem.moves) else found
 
@@ -155,6 +149,19 @@ def log_likelihood(problem: Problem, theta: Theta) -> float:
     h = linear.total[0] * np.outer(linear.width, linear.width) + np.eye(len(linear.width))
     spread = 0.5 * float(np.linalg.slogdet(h)[1])
     return problem.log_density() - linear.cost(linear.best()) - spread
+
+
+def learnt_colour(
+    problem: Problem, theta: Theta, blocks: Labels | None, careful: bool
+) -> tuple[Problem, Array]:
+    """The same, and the Jacobian (n, k) at theta of the problem without colour."""
+    plain = problem.recolour(None)
+    blocks = time_blocks(plain) if blocks is None else blocks
+    linear, jacobian, _ = linearise(plain, theta, blocks)
+    on = tuple(n for n, c in plain.candidates.items() if c.is_on(theta))
+    mode = mode_of(plain, on, [theta], linear, jacobian, blocks)
+    left = mode.residual + jacobian @ (mode.linear.best() - mode.linear.at)
+    return plain.recolour(left, careful=careful), jacobian
 
 
 @dataclass(frozen=True)
@@ -284,9 +291,11 @@ class Baseline:
             linear = condense(free, *priors(problem, theta, free), slopes, r, blocks)
             theta = estimate(problem, linear, linear.best())
         # where the motion moves, the search learns the colour with it
-        if not moving:
-            self.problem = with_learnt_colour(problem, theta, blocks)
-        self._rank(theta, known if moving else None)
+        if not moving and problem.learns_colour:
+            self.problem, plain = learnt_colour(problem, theta, blocks, careful=False)
+            self._rank(theta, self.problem.whiten(plain))
+        else:
+            self._rank(theta, known if moving else None)
 
     def _rank(self, theta: Mapping[str, float], jacobian: Array | None = None) -> None:
         """Linearise at theta, and score every hypothesis there."""
