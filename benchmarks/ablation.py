@@ -101,16 +101,15 @@ RULES = [
     Rule("late sensors stay", SEARCH + "_settle", once,
          lambda result, s, h: bool(s.problem.held_back(result))),
     Rule("swaps", SEARCH + "_swap", lambda s, best: best, _differs),
-    Rule("followed twice", "infer.search:SearchSettings", values={"followed": 1}),
+    Rule("followed twice", "infer.search:FOLLOWED", values={"FOLLOWED": 1}),
     Rule("colour anew", "infer.null_model:Baseline.seen_from", lambda b, theta: None, always),
     Rule("drifting sensors", "infer.null_model:_with_drift", lambda p, theta: p,
          lambda result, p, theta: result is not p),
     Rule("spikes", "problem.noise:caution", lambda r: None,
          lambda result, r: bool(np.any(result < 1.0))),
-    Rule("three tolerances", "infer.spike_slab:SpikeSlabSettings",
+    Rule("three tolerances", "infer.linear:SpikeSlabSettings",
          values={"tolerances": (1.0,)}),
-    Rule("steps to the mode", "infer.mode:SmallEffectsSettings",
-         values={"rounds": 0}),
+    Rule("steps to the mode", "infer.null_model:ROUNDS", values={"ROUNDS": 0}),
     Rule("enlarged noise", "infer.significance:_enlarged",
          lambda own, left, root, power: own.T @ left, always),
     Rule("material", "infer.selection:material", lambda s, h: h),
@@ -137,7 +136,7 @@ RULES = [
     Rule("nothing explains", "answer:VerdictSettings", values={"unexplained": -1.0}),
     Rule("error left", "answer:VerdictSettings", values={"whole": np.inf}),
     Rule("part of structure", "answer:VerdictSettings", values={"part_of_structure": 0.1}),
-    Rule("equivalents", "infer.ranking:equivalents", lambda *_: ()),
+    Rule("equivalents", "infer.verdict:equivalents", lambda *_: ()),
 ]  # fmt: skip
 BY_NAME = {rule.name: rule for rule in RULES}
 

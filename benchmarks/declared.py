@@ -15,7 +15,7 @@ from twin.catalogue import CATALOGUE, hidden
 from twin.figures import Robot
 from twin.measure import Sensors, fault_channels, sensor_fault
 
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.linear import SpikeSlabSettings
 from kemba.identify.problem.candidates import effect_candidates, nominal_figures, sensor_candidates
 from kemba.identify.problem.problem import Candidate
 from kemba.model.spec import load_model

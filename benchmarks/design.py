@@ -69,7 +69,7 @@ def run(truth: str, other: str, seed: int) -> dict[str, Any]:
             side: {
                 "rig": judged.test.name,
                 "log_s": judged.log_s,
-                "expected": judged.evidence.least,
+                "expected": judged.least,
                 "measured": told(judged),
             }
             for side, judged in (("standard", design.standard), ("designed", design.designed))

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from kemba.effects.pneumatics.orifice import OrificeChamber
-from kemba.identify.problem.structure import ORIFICE
+from kemba.identify.problem.candidates import ORIFICE
 from kemba.model import Model, load_model
 
 Record = Mapping[str, Any]

@@ -213,7 +213,7 @@ slow noise for effects. {noise}
 Delays of a fraction of a row were worst: an edge falls before or after a reading, while a slope
 over a row tells of neither. A refitted delay had the residual of its own size, and the model
 without it had not. Every hypothesis is now scored where it fits best, small effects included, by
-the residual there (`kemba/identify/infer/mode.py`), and logs and simulated logs
+the residual there (`kemba/identify/infer/null_model.py`), and logs and simulated logs
 are asked the same: what the slopes about the best fit of nothing say of single effects.
 The verdict also rests on another rule: an effect below a fifth of its size is no finding.
 """

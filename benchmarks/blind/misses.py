@@ -33,9 +33,9 @@ from blind import report, study
 from blind.kinds import Record, hidden, kind, named
 from blind.thorough import ThoroughFit, promised, with_own
 from kemba.identify.discover import discover
+from kemba.identify.infer.linear import NULL, Hypothesis
 from kemba.identify.infer.refit import Fit
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.problem.problem import Theta
 
 STUDIES = (

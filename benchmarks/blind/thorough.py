@@ -11,10 +11,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from kemba.errors import KembaError
-from kemba.identify.infer.linear import Linear, estimate, priors, usual_shapes
+from kemba.identify.infer.linear import Hypothesis, Linear, Ranker, estimate, priors, usual_shapes
 from kemba.identify.infer.null_model import Baseline, LinearisationPoint, effect_bounds
 from kemba.identify.infer.refit import Fit
-from kemba.identify.infer.spike_slab import Hypothesis, Ranker
 from kemba.identify.infer.windows import START
 from kemba.identify.problem.problem import Array, Problem, Theta, bounded
 

@@ -10,8 +10,7 @@ from kemba.config import dump_yaml, parse
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError, enumerated, suggest
 from kemba.identify.answer import read_answer
-from kemba.identify.problem.candidates import where_field
-from kemba.identify.problem.structure import ORIFICE, orifice_item
+from kemba.identify.problem.candidates import ORIFICE, orifice_item, where_field
 from kemba.model.evidence import EvidenceLog, write_covariance
 from kemba.model.spec import ModelSpec, build_model, load_spec
 

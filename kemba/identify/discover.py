@@ -1,7 +1,7 @@
 """From a problem to an answer: search for effects, then doubt what was found."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +18,8 @@ from kemba.identify.answer import (
 from kemba.identify.infer.cross_validation import HeldOut, error, one_part_shows
 from kemba.identify.infer.formula import Formula, look
 from kemba.identify.infer.joint import JointFit, joint_fit, without_figure_aliases
-from kemba.identify.infer.ranking import fitted_errors, ladder, ranked, values
-from kemba.identify.infer.search import Search, SearchSettings
+from kemba.identify.infer.linear import NULL, Hypothesis
+from kemba.identify.infer.search import STRUCTURAL, Search
 from kemba.identify.infer.selection import (
     Selection,
     certain,
@@ -36,7 +36,6 @@ from kemba.identify.infer.significance import (
     null_test,
     smallest_detectable,
 )
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.structure import (
     Rebuilt,
     ahead,
@@ -48,17 +47,20 @@ from kemba.identify.infer.structure import (
 from kemba.identify.infer.verdict import (
     Caveats,
     caveats_of,
+    fitted_errors,
     implausible,
     is_sure,
+    ladder,
+    ranked,
     rest_of,
+    values,
     verdict_on,
 )
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
+from kemba.stopwatch import Tell, silent
 
 WRITTEN = ("missing", "partly")  # verdicts that give a model
-
-Talk = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def discover(
     problem: Problem,
     holdout: Problem | None = None,
     time_limit: float = np.inf,
-    say: Talk = lambda text: None,
+    say: Tell = silent,
 ) -> Discovery:
     """Which effect is missing from the model behind `problem`, if any.
 
@@ -90,7 +92,7 @@ def discover(
     started = time.monotonic()
     share = DiscoverSettings.searching
     search = Search(problem, started + share * time_limit, say, due=started + time_limit)
-    search.prepare()
+    search.start()
     say(what_shows(search, null_test(search)).sentence)
     found = _discovered(search, search.first(), holdout)
     found.answer.runtime_s = time.monotonic() - started
@@ -106,7 +108,7 @@ def what_shows(search: Search, test: NullTest) -> Identifiability:
 def _discovered(search: Search, guess: Hypothesis, holdout: Problem | None) -> Discovery:
     """The answer from a first guess on, of this structure or another that leaves far less."""
     guessed = search.problem.structures & set(guess)
-    least = 0.0 if guessed else SearchSettings.structural
+    least = 0.0 if guessed else STRUCTURAL
     theta = search.points[guess].fit.theta
     other = None if search.ended else ahead(search.problem, theta, least)
     rebuilt = _with_structure(search, other, holdout) if other else None

@@ -8,7 +8,7 @@ from typing import Any
 from kemba.errors import enumerated
 from kemba.identify.design.rig import VirtualBench, judged_menu
 from kemba.identify.design.robot import STANDARD, try_out
-from kemba.identify.design.separation import ExperimentSettings, Rivals, Separation
+from kemba.identify.design.separation import ExperimentSettings, JudgedTest, Rivals
 from kemba.identify.discover import what_shows
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import Identifiability, null_test
@@ -44,16 +44,16 @@ def splitting_test(model: str, problem: Problem, effects: Sequence[str]) -> Spli
     """The standard test for effects of a problem of `model`, a YAML or a shipped name."""
     rivals = Rivals({e: problem.candidates[e].typical() for e in effects}, {})
     piston, robot = load_model(model, rig=True), load_model(model)
-    menu: list[tuple[str, float, Separation]] = []
+    menu: list[tuple[str, JudgedTest]] = []
     if not piston.mechanism.rig:  # of one's own rigs none is known
         judged = judged_menu(VirtualBench(piston, ExperimentSettings.coarse), rivals)
-        menu = [(f"the rig test '{one.test.name}'", one.log_s, one.evidence) for one in judged]
+        menu = [(f"the rig test '{one.test.name}'", one) for one in judged]
     if len(robot.mechanism.legs) > 1 and (sway := try_out(robot, STANDARD, rivals)):
-        menu.append(("a slow sway of the robot", sway.log_s, sway.evidence))
+        menu.append(("a slow sway of the robot", sway))
     found = (
-        SplittingTest(effects, test, evidence.least, log_s)
-        for test, log_s, evidence in menu
-        if len(evidence.nats) == len(effects) - 1
+        SplittingTest(effects, name, one.least, one.log_s)
+        for name, one in menu
+        if len(one.nats) == len(effects) - 1
     )
     return max(found, key=lambda test: test.nats, default=SplittingTest(effects))
 
@@ -94,7 +94,7 @@ def preview(
     read = read_logs(logs, load_map(column_map) if column_map else None)
     problem, _ = posed(read, model, tell)
     search = Search(problem, say=tell)
-    search.prepare()
+    search.start()
     told = what_shows(search, null_test(search))
     tell("standard tests for what looks alike")
     tests = [splitting_test(model, problem, group) for group in told.alike]

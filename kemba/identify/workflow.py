@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -94,7 +94,7 @@ def discover_logs(
     model: str = "planning",
     column_map: str | Path | None = None,
     time_limit: float = 300.0,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     out: str | Path | None = None,
     share: float = 1.0,
 ) -> tuple[Answer, Discovery | None]:

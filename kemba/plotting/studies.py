@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from kemba.identify.compare.compare import conditions
 from kemba.identify.discover import Discovery
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.linear import NULL, Hypothesis
 from kemba.identify.infer.windows import free_starts
 from kemba.identify.problem.problem import Rows
 from kemba.plotting.comparison import (

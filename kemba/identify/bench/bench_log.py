@@ -16,17 +16,15 @@ from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.identify.logs.gate import ROW
 from kemba.identify.logs.local_fit import local_fit, weights
 from kemba.identify.logs.reading import held
-from kemba.identify.problem.noise import difference_sigma, telling
-from kemba.identify.problem.problem import Array, Flags
-from kemba.identify.problem.sensor_noise import (
+from kemba.identify.problem.noise import (
     ChannelNoise,
     ColourSettings,
-    Kind,
-    chosen_noise,
-    covariances,
+    difference_sigma,
+    learnt_noise,
     pairs,
-    weighted,
+    telling,
 )
+from kemba.identify.problem.problem import Array, Flags
 from kemba.trajectory import Trajectory
 
 # How the velocity of an imposed motion is found.
@@ -149,19 +147,14 @@ def position_noise(logs: Sequence[tuple[Array, Array]]) -> ChannelNoise:
     """Noise of the position sensor that all `logs` (times [s] and positions [m], both (n,)) share,
     in each log's `difference_sigma`; white where the piston rests too little to tell."""
     quiet = [found for time, x in logs if (found := _quiet(time, x)) is not None]
-    settings = ColourSettings
-    if sum(int(np.isfinite(left).sum()) for left, _ in quiet) < settings.fewest:
+    if not quiet:
         return ChannelNoise()
     errors = np.full((max(len(left) for left, _ in quiet), len(quiet), 1), np.nan)
     for i, (left, _) in enumerate(quiet):
         errors[: len(left), i, 0] = left
     step = float(np.median([step for _, step in quiet]))
-    memories = (0.0, *settings.memories)
-    columns, counts = [_expected(memory, step) for memory in memories], pairs(errors)
-    measured = covariances(np.nan_to_num(errors)[..., None], errors, counts)
-    kinds = [Kind(0, memory) for memory in memories]
-    told = weighted(columns, measured, counts)
-    return chosen_noise(*told, kinds, np.array([MOST]), np.array([True]))[0]
+    made = {(0, memory): _expected(memory, step) for memory in (0.0, *ColourSettings.memories)}
+    return learnt_noise(errors, pairs(errors), made, np.array([MOST]))[0]
 
 
 def _quiet(time: Array, x: Array) -> tuple[Array, float] | None:

@@ -5,14 +5,14 @@ the chambers then seem to fill later and later, as with a hose that grows. Such 
 before any fit, and the logs are put on one clock; what is left of the rate is a nuisance parameter.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from kemba.identify.bench.bench_log import BenchLog, SmoothedMotion
-from kemba.identify.infer.linear import condense, names_of, priors
+from kemba.identify.infer.linear import linearise, moved, priors
 from kemba.identify.logs.reading import GateSettings
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.trajectory import Trajectory
@@ -27,31 +27,29 @@ OWNERS: Mapping[str, Mapping[str, float]] = {
 }
 
 
-class ClockSettings:
-    """Clocks that run at different rates."""
-
-    # prior sigma of what is left of a rate after logs were put on one clock: the search for it was
-    # off by 0.1e-3 to 0.3e-3 on logs of the twin
-    rate = 3e-4
-    farthest = 0.16  # largest drift over a log that is looked for before any fit [s]
-    stride = 8e-3  # step of that search [s]: the fastest rise time of Table I
-    # rows of the logs in which a drift is looked for: the search takes about 6 s of CPU time for so
-    # many; `check` has to end in 10 s
-    rows = 6000
-    # mean square, in noise units, that a fit with all effects may leave of logs in which no drift
-    # is looked for: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing
-    # 0.9 to 19
-    fits = 1.0
-    # share of its cost that such a fit may keep with a drift that is believed: on the twin, 0.99 or
-    # more on 22 logs without drift, 0.02 to 0.6 with 10 ms or more of the commands
-    better = 0.9
-    again = 3.0  # factor of the least cost within which a trial is linearised again
+# Clocks that run at different rates.
+# prior sigma of what is left of a rate after logs were put on one clock: the search for it was
+# off by 0.1e-3 to 0.3e-3 on logs of the twin
+RATE = 3e-4
+FARTHEST = 0.16  # largest drift over a log that is looked for before any fit [s]
+STRIDE = 8e-3  # step of that search [s]: the fastest rise time of Table I
+# rows of the logs in which a drift is looked for: the search takes about 6 s of CPU time for so
+# many; `check` has to end in 10 s
+ROWS = 6000
+# mean square, in noise units, that a fit with all effects may leave of logs in which no drift
+# is looked for: 0.8 to 1.1 on clean logs of the twin of tests/twin, where one effect is missing
+# 0.9 to 19
+FITS = 1.0
+# share of its cost that such a fit may keep with a drift that is believed: on the twin, 0.99 or
+# more on 22 logs without drift, 0.02 to 0.6 with 10 ms or more of the commands
+BETTER = 0.9
+AGAIN = 3.0  # factor of the least cost within which a trial is linearised again
 
 
 def nuisance(drift: Drift | None) -> dict[str, tuple[float, float]]:
     """Nominal value and prior sigma of the rates that are not exactly known after a drift."""
     moved = OWNERS[drift[0]] if drift else ()
-    return dict.fromkeys(moved, (0.0, ClockSettings.rate))
+    return dict.fromkeys(moved, (0.0, RATE))
 
 
 def commands_by_one_clock(run: BenchLog, theta: Theta) -> BenchLog:
@@ -79,7 +77,7 @@ def motion_by_one_clock(motion: SmoothedMotion, theta: Theta) -> SmoothedMotion:
 
 def looked_at(logs: Sequence[Trajectory]) -> list[Trajectory]:
     """The first logs, as many as are searched for a drift; the last of them is cut."""
-    found, left = [], ClockSettings.rows
+    found, left = [], ROWS
     for log in logs:
         found.append(log.rows(slice(0, left)))
         left -= len(log)
@@ -95,53 +93,51 @@ def drift_between(problem: Problem, logs: Sequence[BenchLog]) -> Drift | None:
     The model with all effects free is linearised and fitted at every trial of a rate; where a rate
     does well it is linearised again, since slopes along a wrong motion may praise a wrong rate.
     """
-    settings, at_zero = ClockSettings, _Linearised(problem, {})
-    usual = at_zero.cost({})
-    if 2.0 * usual < settings.fits * at_zero.rows:
+    cost = _cost_about(problem, {})
+    usual = cost({})
+    if 2.0 * usual < FITS * len(problem.rows()):
         return None
-    step = settings.stride / max(float(np.ptp(log.motion.time)) for log in logs)
-    half = step * np.arange(1.0, settings.farthest / settings.stride + 0.5)
+    step = STRIDE / max(float(np.ptp(log.motion.time)) for log in logs)
+    half = step * np.arange(1.0, FARTHEST / STRIDE + 0.5)
     costs = {
-        (owner, sign * rate): at_zero.cost(_theta(owner, sign * rate))
+        (owner, sign * rate): cost(_theta(owner, sign * rate))
         for owner in OWNERS
         for sign in (1.0, -1.0)
         for rate in (0.5 * step, *half.tolist())
     }
-    if min(costs.values()) > settings.better * usual:
+    if min(costs.values()) > BETTER * usual:
         return None
     leaders: dict[tuple[str, bool], Drift] = {}
     for owner, rate in sorted(costs, key=costs.__getitem__):
-        if costs[owner, rate] < settings.again * min(costs.values()):
+        if costs[owner, rate] < AGAIN * min(costs.values()):
             leaders.setdefault((owner, rate > 0), (owner, rate))
     found = [_refined(problem, owner, rate, step) for owner, rate in leaders.values()]
-    alike = min(found)[0] / settings.better  # where the piston hardly moves, its clock is no matter
+    alike = min(found)[0] / BETTER  # where the piston hardly moves, its clock is no matter
     order = list(OWNERS)
     within = [(cost, drift) for cost, drift in found if cost <= alike]
     least, (owner, rate) = min(within, key=lambda item: (order.index(item[1][0]), item[0]))
     inside = abs(rate) < half[-1] - 0.5 * step
-    return (owner, rate) if inside and least < settings.better * usual else None
+    return (owner, rate) if inside and least < BETTER * usual else None
 
 
-class _Linearised:
-    """A problem linearised at theta, with every effect of the catalogue free."""
+def _cost_about(problem: Problem, theta: Theta) -> Callable[[Theta], float]:
+    """What the best fit leaves at any theta, every effect free, with the slopes at this one."""
+    blocks = np.zeros(len(problem.rows()), dtype=int)
+    linear, slopes, _ = linearise(problem, theta, blocks)
 
-    def __init__(self, problem: Problem, theta: Theta) -> None:
-        self.problem, self.names = problem, names_of(problem, {})
-        self.slopes = problem.jacobian(theta, self.names)
-        self.rows = len(self.slopes)
+    def cost(at: Theta) -> float:
+        z, *_ = priors(problem, at, linear.names)
+        there = moved(linear, z, slopes, problem.residual(at), blocks)
+        return there.cost(there.best())
 
-    def cost(self, theta: Theta) -> float:
-        """What the best fit about theta leaves."""
-        at, r = priors(self.problem, theta, self.names), self.problem.residual(theta)
-        linear = condense(self.names, *at, self.slopes, r, np.zeros(len(r), dtype=int))
-        return linear.cost(linear.best())
+    return cost
 
 
 def _refined(problem: Problem, owner: str, rate: float, step: float) -> tuple[float, Drift]:
     """Cost and drift of the best rate near a good one, with the slopes there."""
-    near = _Linearised(problem, _theta(owner, rate))
+    near = _cost_about(problem, _theta(owner, rate))
     found = minimize_scalar(
-        lambda trial: near.cost(_theta(owner, trial)),
+        lambda trial: near(_theta(owner, trial)),
         bounds=(rate - 0.5 * step, rate + 0.5 * step),
         method="bounded",
         options={"xatol": 0.01 * step},

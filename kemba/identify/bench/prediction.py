@@ -50,11 +50,8 @@ class RigModel:
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.u).T)
-        self._functions = {
-            "force": ca.Function("force", inputs, [ca.densify(force)]),
-            "output": ca.Function("output", inputs, [ca.densify(results)]),
-        }
-        self._maps: dict[tuple[str, int], Buffered] = {}
+        self._output = ca.Function("output", inputs, [ca.densify(results)])
+        self._maps: dict[int, Buffered] = {}
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""
@@ -92,17 +89,15 @@ class RigModel:
         x, (v0, a) = moved.value, moved.rates
         fixed = np.repeat(p[:, None], n, axis=1)
         states = dict(zip(self.state_names, s, strict=True))
-        out = self._mapped("output", n)(s, x, v0, a, blurred, fixed)[0].copy()
+        if n not in self._maps:
+            self._maps[n] = Buffered(self._output.map(n))
+        mapped = self._maps[n]
+        out = mapped(s, x, v0, a, blurred, fixed)[0].copy()
         force = V_MIDDLE * out[0]
         for place, weight in V_NODES:
             v = v0 + place * motion.v_sigma
-            force += weight * self._mapped("force", n)(s, x, v, a, blurred, fixed)[0][0]
+            force += weight * mapped(s, x, v, a, blurred, fixed)[0][0]
         return Prediction(force, out[1:3].T, blurred.T, states)
-
-    def _mapped(self, kind: str, n: int) -> Buffered:
-        if (kind, n) not in self._maps:
-            self._maps[kind, n] = Buffered(self._functions[kind].map(n))
-        return self._maps[kind, n]
 
 
 def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:

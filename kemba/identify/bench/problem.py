@@ -20,18 +20,17 @@ from kemba.identify.bench.bench_log import (
 )
 from kemba.identify.bench.prediction import SENT_LATE, BenchPredictor, settle_starts, standardised
 from kemba.identify.bench.validate import contradictions, crossed
-from kemba.identify.compare.force_profiles import lags, risen
-from kemba.identify.infer.linear import within
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.compare.force_profiles import rises
+from kemba.identify.infer.linear import SpikeSlabSettings, within
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import effect_candidates, sensor_candidates
-from kemba.identify.problem.missing_force import dahl, end_terms, missing_along
+from kemba.identify.problem.missing_force import missing_along, rod_terms
 from kemba.identify.problem.noise import ColouredProblem, colours, whiten
 from kemba.identify.problem.problem import (
     Array,
     Changes,
     ForceChannel,
-    Leftover,
+    Labels,
     MissingForce,
     OperatingPoint,
     Rows,
@@ -51,28 +50,21 @@ def terms(motion: SmoothedMotion, u: Array, stroke: float) -> Iterator[tuple[str
     x, v, (u_e, u_r) = motion.x, motion.v, u.T
     sign = np.tanh(v / V_COULOMB)
     out, back = np.maximum(v, 0.0), np.minimum(v, 0.0)
-    yield from end_terms(x, stroke)
+    yield from rod_terms(x, v, stroke, CREEPS)
     yield f"x - {stroke / 2:g}", x - stroke / 2
     yield f"(x - {stroke / 2:g})**2", (x - stroke / 2) ** 2
-    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
     yield "x*u_e", x * u_e
     yield "x*u_r", x * u_r
-    yield "max(v, 0)", out
     yield "max(v, 0)*u_e", out * u_e
     yield "max(v, 0)*u_r", out * u_r
     yield "min(v, 0)*u_e", back * u_e
     yield "min(v, 0)*u_r", back * u_r
     yield "v*x", v * x
-    yield "v**3", v**3
     yield f"tanh(v/{V_COULOMB:g})*u_e", sign * u_e
     yield f"tanh(v/{V_COULOMB:g})*u_r", sign * u_r
-    yield f"tanh(v/{V_COULOMB:g})*x", sign * x
-    yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
     yield "a", motion.a
     yield "u_e", u_e
     yield "u_r", u_r
-    for travel in CREEPS:
-        yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
 def features(motion: SmoothedMotion, u: Array, stroke: float) -> Array:
@@ -238,12 +230,7 @@ class BenchProblem(ColouredProblem):
             "position [mm]": np.where(force, 1e3 * at.x, np.nan),
             "model force [N]": np.where(force, at.force, np.nan),
         }
-        after = {}
-        for side in ("extend", "retract"):
-            after[side] = np.zeros((len(rows), len(lags()) - 1))
-            for i, sent in enumerate(self.commands()):
-                own = rows.run == i
-                after[side][own] = risen(*sent[f"valve/{side}"], rows.time[own])
+        after = {s: rises(self, rows, f"valve/{s}") for s in ("extend", "retract")}
         return [ForceChannel("rod", "N", FRICTION, quantities, columns, after)]
 
     def missing_force(
@@ -289,7 +276,7 @@ class BenchProblem(ColouredProblem):
         peak = max(float(np.percentile(np.abs(force), PEAK)) for force in forces)
         return peak / FRICTION
 
-    def leftover(self, theta: Theta) -> Leftover:
+    def leftover(self, theta: Theta) -> tuple[Array, Array, Labels]:
         """Force residual over its noise and over what every model leaves, and what it may depend
         on."""
         parts = []
@@ -298,7 +285,7 @@ class BenchProblem(ColouredProblem):
             seen = features(*self._along(theta, i))
             parts.append((r, seen[log.keep[FORCE]], np.full(len(r), i)))
         residual, columns, run = (np.concatenate(p) for p in zip(*parts, strict=True))
-        return Leftover(residual, columns, run)
+        return residual, columns, run
 
     def _imperfection(self, index: int) -> Array:
         """Spread (n,), in noise units, of the force if every effect may be there a little."""

@@ -20,7 +20,7 @@ from kemba.identify.compare.hints import (
 from kemba.identify.compare.words import place_of
 from kemba.identify.infer.windows import Windows, aggregation_windows, free_starts, rms
 from kemba.identify.problem.missing_force import Peak, peaks
-from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Texts, Theta
+from kemba.identify.problem.problem import Array, MissingForce, Problem, Rows, Theta
 from kemba.units import short
 
 FAIR = 1.5  # error ratio below which it nearly explains them
@@ -109,8 +109,10 @@ def compare(
     sent = after_commands(problem, rows, r / np.sqrt(problem.expected_power()))
     forces = tuple(force_profiles(problem, r))
     left, q_value = within_tolerance(r, known)
-    ratio, clean = _tolerant(rows, region, window, left)
-    clean = clean and q_value >= BinSettings.false_discoveries
+    at_best = window.sums(left)
+    ratio, bins = rms(at_best), condition_bins(rows, region, window.first, at_best)
+    clean = q_value >= BinSettings.false_discoveries and ratio <= BinSettings.tolerated
+    clean = clean and not any(c.significant and c.ratio > FAIR for c in bins)
     found = Comparison(
         tuple(logs) or problem.runs,
         model,
@@ -135,14 +137,6 @@ def conditions(problem: Problem, theta: Theta | None = None) -> list[ConditionBi
     region = np.full(len(rows), "", dtype=object)
     window = aggregation_windows(problem, rows, region)
     return list(condition_bins(rows, region, window.first, window.sums(r)))
-
-
-def _tolerant(rows: Rows, region: Texts, window: Windows, left: Array) -> tuple[float, bool]:
-    """Error ratio of what tolerances leave; whether it is within the noise nearly everywhere."""
-    sums = window.sums(left)
-    bins = condition_bins(rows, region, window.first, sums)
-    clean = not any(c.significant and c.ratio > FAIR for c in bins)
-    return rms(sums), clean and rms(sums) <= BinSettings.tolerated
 
 
 UNITS = {"x": "m", "z": "m", "q": "rad", "pitch": "rad", "F": "N", "P": "Pa"}  # by a name's end

@@ -8,25 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kemba.identify.problem.problem import Array, ForceChannel, Problem
+from kemba.identify.problem.problem import Array, ForceChannel, Problem, Rows
 from kemba.units import short
 
-
-class ForceProfileSettings:
-    """How a missing force is looked for, and when it is said to be there."""
-
-    bins = 8  # most bins of a quantity
-    fewest = 30  # samples in a bin
-    narrow = 0.02  # smallest width of a bin over the middle 90 % of a quantity
-    wide = 20.0  # prior sigma of a bin's force over a channel's usual force
-    first_lag = 0.0015  # shortest time from a command's change to an error [s]: over one row
-    last_lag = 0.042  # longest time [s]: beyond the slowest rise time of Table I, 37 ms
-    lag_step = 0.004  # step of these times [s]
-    same = 0.1  # share of a force's power by which bins may differ and still be one force
-    doubt = 20.0  # gain beyond which a force is there without doubt [nats]
-    negligible = 0.1  # negligible force over a channel's usual force
-    sure = 3.0  # sigmas beyond which a bin's force is not zero: three sigmas
-    plain = 60.0  # gain that nominal figures at the edge of their tolerance do not reach [nats]
+# How a missing force is looked for, and when it is said to be there.
+BINS = 8  # most bins of a quantity
+FEWEST = 30  # samples in a bin
+NARROW = 0.02  # smallest width of a bin over the middle 90 % of a quantity
+WIDE = 20.0  # prior sigma of a bin's force over a channel's usual force
+FIRST_LAG = 0.0015  # shortest time from a command's change to an error [s]: over one row
+LAST_LAG = 0.042  # longest time [s]: beyond the slowest rise time of Table I, 37 ms
+LAG_STEP = 0.004  # step of these times [s]
+SAME = 0.1  # share of a force's power by which bins may differ and still be one force
+DOUBT = 20.0  # gain beyond which a force is there without doubt [nats]
+NEGLIGIBLE = 0.1  # negligible force over a channel's usual force
+SURE = 3.0  # sigmas beyond which a bin's force is not zero: three sigmas
+PLAIN = 60.0  # gain that nominal figures at the edge of their tolerance do not reach [nats]
 
 
 @dataclass(frozen=True)
@@ -46,13 +43,12 @@ class ForceProfile:
     @property
     def matters(self) -> bool:
         """Whether a force is certainly there, and is not negligible."""
-        settings = ForceProfileSettings
-        return self.gain > settings.doubt and self.largest > settings.negligible * self.usual
+        return self.gain > DOUBT and self.largest > NEGLIGIBLE * self.usual
 
     @property
     def largest(self) -> float:
         """The largest force [unit] that differs from zero by more than its error."""
-        plain = np.abs(self.force) > ForceProfileSettings.sure * self.sigma
+        plain = np.abs(self.force) > SURE * self.sigma
         return float(np.max(np.abs(self.force[plain]), initial=0.0))
 
     @property
@@ -61,8 +57,7 @@ class ForceProfile:
         weight = 1.0 / self.sigma**2
         mean = float(np.sum(weight * self.force) / np.sum(weight))
         varies = float(np.sum(weight * (self.force - mean) ** 2))
-        same = ForceProfileSettings.same
-        return mean if varies < same * float(np.sum(weight)) * mean**2 else None
+        return mean if varies < SAME * float(np.sum(weight)) * mean**2 else None
 
     def __str__(self) -> str:
         what = self.quantity.partition(" [")[0]
@@ -109,8 +104,8 @@ def _force_profile(channel: ForceChannel, label: str, residual: Array) -> ForceP
 def _solved(
     channel: ForceChannel, label: str, centre: Array, shapes: Array, residual: Array
 ) -> ForceProfile:
-    columns, wide = channel.columns(shapes), ForceProfileSettings.wide
-    prior = np.eye(shapes.shape[-1]) / (wide * channel.usual) ** 2
+    columns = channel.columns(shapes)
+    prior = np.eye(shapes.shape[-1]) / (WIDE * channel.usual) ** 2
     gram, slope = columns.T @ columns + prior, columns.T @ residual
     force = -np.linalg.solve(gram, slope)
     sigma = np.sqrt(np.diag(np.linalg.inv(gram)))
@@ -122,8 +117,7 @@ def _solved(
 
 def lags() -> Array:
     """Edges (k,) [s] of the times between a command's change and an error."""
-    settings = ForceProfileSettings
-    return np.arange(settings.first_lag, settings.last_lag, settings.lag_step)
+    return np.arange(FIRST_LAG, LAST_LAG, LAG_STEP)
 
 
 def middle(edges: Array) -> Array:
@@ -141,15 +135,24 @@ def risen(times: Array, sizes: Array, at: Array) -> Array:
     return np.asarray(level[:, :-1] - level[:, 1:])
 
 
+def rises(problem: Problem, rows: Rows, command: str) -> Array:
+    """The same before every row (n, l) of a problem's logs; zero in runs without the command."""
+    found = np.zeros((len(rows), len(lags()) - 1))
+    for i, sent in enumerate(problem.commands()):
+        if command in sent:
+            own = rows.run == i
+            found[own] = risen(*sent[command], rows.time[own])
+    return found
+
+
 def bins(values: Array) -> Array | None:
     """Edges (b + 1,) of bins with the same number of samples each; None with too few samples."""
-    settings = ForceProfileSettings
     seen = values[np.isfinite(values)]
-    if len(seen) < 2 * settings.fewest:
+    if len(seen) < 2 * FEWEST:
         return None
-    count = min(settings.bins, len(seen) // settings.fewest)
+    count = min(BINS, len(seen) // FEWEST)
     edges = np.quantile(seen, np.linspace(0.0, 1.0, count + 1))
-    narrowest = settings.narrow * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
+    narrowest = NARROW * float(np.diff(np.quantile(seen, (0.05, 0.95)))[0])
     kept = [float(edges[0])]
     for edge in edges[1:-1]:
         if min(edge - kept[-1], edges[-1] - edge) > narrowest:

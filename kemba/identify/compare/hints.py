@@ -9,14 +9,14 @@ from scipy.special import chdtrc, ndtr, ndtri
 
 from kemba.identify.compare.bins import false_discoveries
 from kemba.identify.compare.force_profiles import (
+    PLAIN,
     ForceProfile,
-    ForceProfileSettings,
     lags,
     middle,
-    risen,
+    rises,
 )
 from kemba.identify.compare.words import command, quantity
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
+from kemba.identify.infer.linear import SpikeSlabSettings
 from kemba.identify.infer.windows import codes
 from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Rows, Theta
 
@@ -82,9 +82,8 @@ class Hint:
 
 def lacking(found: Sequence[ForceProfile]) -> list[Hint]:
     """The missing force that explains most, if it explains enough."""
-    plain = ForceProfileSettings.plain
     best = max(found, key=lambda profile: profile.gain, default=None)
-    if best is None or best.gain <= plain or not best.largest:
+    if best is None or best.gain <= PLAIN or not best.largest:
         return []
     return [Hint("law", str(best), best.gain)]
 
@@ -96,14 +95,9 @@ def after_commands(problem: Problem, rows: Rows, white: Array) -> list[Hint]:
     `white` (n,): residual with unit variance where the model is right. A command's rise within each
     lag is the regressor of every channel's error.
     """
-    runs, found = problem.commands(), []
-    names = sorted({n for run in runs for n in run})
+    found, names = [], sorted({n for run in problem.commands() for n in run})
     for name in names:
-        rise = np.zeros((len(rows), len(lags()) - 1))
-        for i, changes in enumerate(runs):
-            if name in changes:
-                own = rows.run == i
-                rise[own] = risen(*changes[name], rows.time[own])
+        rise = rises(problem, rows, name)
         z = np.zeros((len(rows.channels), rise.shape[1]))
         for k in range(len(z)):
             own = rows.channel == k

@@ -5,7 +5,7 @@ Tests are judged by the logs that they would give if the model were nearly right
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -40,6 +40,7 @@ from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.rigs import CourseRig, DynamometerRig, LockedRig, RandomRig, Rig, Test
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
 
@@ -54,12 +55,21 @@ class VirtualBench:
         self.colour = _colour(rows)
         self._first: BenchProblem | None = None
 
+    def tests(self, rig: Rig) -> list[Test]:
+        """The tests of a rig that are judged: the first few of them."""
+        every = rig.tests(np.random.default_rng(0), self.stroke)
+        return list(islice(every, ExperimentSettings.tests))
+
+    def judged(self, rig: Rig, evidence: Separation) -> JudgedTest:
+        """A rig with this evidence, and the seconds of log of its tests."""
+        log_s = sum(float(np.ptp(test.times)) for test in self.tests(rig))
+        return JudgedTest(evidence.first, evidence.nats, rig, log_s)
+
     def problem(self, rig: Rig) -> BenchProblem:
-        """The problem of a rig's tests, the first few of them."""
-        tests = rig.tests(np.random.default_rng(0), self.stroke)
+        """The problem of these tests."""
         logs = [
             prepare(test.name, _virtual_log(test, self.rows, i), on_rows=True)
-            for i, test in enumerate(islice(tests, ExperimentSettings.tests))
+            for i, test in enumerate(self.tests(rig))
         ]
         if len(logs) > 1:
             return self._coloured(BenchProblem(logs, self.model))
@@ -80,14 +90,7 @@ def _with_logs(problem: BenchProblem, logs: Sequence[BenchLog]) -> BenchProblem:
     return found
 
 
-def log_time(rig: Rig, stroke: float) -> float:
-    """Seconds of log of the tests that are judged."""
-    tests: Iterable[Test] = rig.tests(np.random.default_rng(0), stroke)
-    tests = islice(tests, ExperimentSettings.tests)
-    return sum(float(test.times[-1] - test.times[0]) for test in tests)
-
-
-def _virtual_log(test: Test, rows: float, seed: int = 0) -> Trajectory:
+def _virtual_log(test: Test, rows: float, seed: int) -> Trajectory:
     """A test as a log with so many rows per second. Its force is the noise of the sensor alone."""
     settings, rng = ExperimentSettings, np.random.default_rng(seed)
     step = float(test.times[1] - test.times[0])
@@ -141,87 +144,75 @@ def judged_menu(bench: VirtualBench, rivals: Rivals) -> Iterator[JudgedTest]:
         found = separation(bench.problem(rig), rivals)
         if found is None:
             return
-        yield JudgedTest(rig, found, log_time(rig, bench.stroke))
+        yield bench.judged(rig, found)
 
 
-class RigCourseSettings:
-    """What a designed test of a rig may do."""
-
-    longest = 2.0  # longest log of a designed test [s]: short
-    # shortest log of a designed test [s]: chambers fill and vent three times, at the slowest rise
-    # time of Table I
-    shortest = 0.3
-    share = 0.5  # its log time as a share of that of the best standard test: half
-    places = 9  # places that the rod goes through
-    most_laps = 3  # most times that it goes through them
-    pulses = 3  # pulses of each valve
-    # shortest time between two switchings of a valve [s]: twice the dead time of the paper's valves
-    dwell = 0.02
-    fastest = 1.2  # highest speed of the rod [m.s-1]: that of the fastest standard test
-
-
+# What a designed test of a rig may do.
+LONGEST = 2.0  # longest log of a designed test [s]: short
+# shortest log of a designed test [s]: chambers fill and vent three times, at the slowest rise
+# time of Table I
+SHORTEST = 0.3
+SHARE = 0.5  # its log time as a share of that of the best standard test: half
+PLACES = 9  # places that the rod goes through
+MOST_LAPS = 3  # most times that it goes through them
+PULSES = 3  # pulses of each valve
+# shortest time between two switchings of a valve [s]: twice the dead time of the paper's valves
+DWELL = 0.02
+FASTEST = 1.2  # highest speed of the rod [m.s-1]: that of the fastest standard test
 STEEPEST = 1.5  # highest speed of a monotone cubic piece that begins and ends at rest, by its mean
 
 
 def course(point: Array, duration: float, stroke: float) -> CourseRig:
     """The course of a point (k,) of the unit cube, which lasts `duration` [s]."""
-    settings = RigCourseSettings
-    count, pulses = settings.places, settings.pulses
-    laps = 1 + min(int(point[-1] * settings.most_laps), settings.most_laps - 1)
-    every = duration / (laps * (count - 1))
-    first, second = np.split(point[count:-1], 2)
-    way = np.append(np.tile(point[: count - 1], laps), point[count - 1]) * stroke
-    reach, places = settings.fastest * every / STEEPEST, [float(way[0])]
+    laps = 1 + min(int(point[-1] * MOST_LAPS), MOST_LAPS - 1)
+    every = duration / (laps * (PLACES - 1))
+    first, second = np.split(point[PLACES:-1], 2)
+    way = np.append(np.tile(point[: PLACES - 1], laps), point[PLACES - 1]) * stroke
+    reach, places = FASTEST * every / STEEPEST, [float(way[0])]
     for x in way[1:]:
         places.append(float(np.clip(x, places[-1] - reach, places[-1] + reach)))
     return CourseRig(
         name="designed",
         places=tuple(round(x, 5) for x in places),
         every=every,
-        extend=_spans(first, duration, pulses, settings.dwell),
-        retract=_spans(second, duration, pulses, settings.dwell),
+        extend=_spans(first, duration),
+        retract=_spans(second, duration),
     )
 
 
-def _spans(
-    weights: Array, duration: float, pulses: int, dwell: float
-) -> tuple[tuple[float, float], ...]:
-    """Spans in which a valve is on: `weights` (2 pulses,) share the time, `dwell` [s] at least."""
+def _spans(weights: Array, duration: float) -> tuple[tuple[float, float], ...]:
+    """Spans in which a valve is on: `weights` (2 pulses,) share the time, each for a while."""
     weights = np.append(weights, 0.5) + 1e-3
-    dwell = min(dwell, 0.5 * duration / len(weights))
+    dwell = min(DWELL, 0.5 * duration / len(weights))
     parts = dwell + weights / weights.sum() * (duration - dwell * len(weights))
     edges = np.round(np.cumsum(parts[:-1]), 4)
-    return tuple((float(edges[2 * i]), float(edges[2 * i + 1])) for i in range(pulses))
+    return tuple((float(edges[2 * i]), float(edges[2 * i + 1])) for i in range(len(edges) // 2))
 
 
 def beginnings(count: int, seed: int) -> Array:
     """Points (count, k) from which a search begins: plain courses, then points that fill the
     cube evenly."""
-    settings = RigCourseSettings
-    plain = np.array(list(_plain(settings.places, settings.pulses)))
+    plain = np.array(list(_plain()))
     more = max(count - len(plain), 1)
     even = qmc.Sobol(plain.shape[1], rng=seed).random_base2(int(np.ceil(np.log2(more))))
     return np.asarray(np.vstack([plain, even])[:count])
 
 
-def _plain(places: int, pulses: int) -> Iterator[Array]:
+def _plain() -> Iterator[Array]:
     """A rod at rest, a slow stroke, strokes to and fro, each with valves in turn and together."""
     ways = [
-        np.full(places, 0.5),
-        np.linspace(0.05, 0.95, places),
-        0.5 - 0.45 * np.cos(np.arange(places) * np.pi / 2),
+        np.full(PLACES, 0.5),
+        np.linspace(0.05, 0.95, PLACES),
+        0.5 - 0.45 * np.cos(np.arange(PLACES) * np.pi / 2),
     ]
-    early, late = np.tile([0.2, 0.5], pulses), np.tile([0.5, 0.2], pulses)
+    early, late = np.tile([0.2, 0.5], PULSES), np.tile([0.5, 0.2], PULSES)
     for way in ways:
         yield np.concatenate([way, early, late, [0.0]])
         yield np.concatenate([way, early, early, [1.0]])
 
 
 def _best_point(
-    worth: Callable[[Array], float],
-    begin: Array,
-    say: Callable[[str], None] = lambda text: None,
-    bounded: bool = True,
+    worth: Callable[[Array], float], begin: Array, say: Tell, bounded: bool
 ) -> tuple[Array, int]:
     """The point (k,) of the unit cube worth most in a search from `begin` (m, k); tries."""
     settings, started = DesignSearchSettings, time.monotonic()
@@ -256,7 +247,7 @@ class RigDesign(Proposal):
     def chosen(self) -> JudgedTest:
         """The designed test, except where only the standard one settles the question."""
         clear = ExperimentSettings.clear
-        least, other = self.designed.evidence.least, self.standard.evidence.least
+        least, other = self.designed.least, self.standard.least
         return self.standard if least < min(clear, other) else self.designed
 
     @property
@@ -276,7 +267,7 @@ class RigDesign(Proposal):
         if chosen is standard:
             return f"{text}; no shorter test that was tried gives as much."
         other = f"the best standard test, '{standard.test.name}' ({standard.log_s:.2g} s)"
-        if standard.evidence.least < 1.0:
+        if standard.least < 1.0:
             return f"{text}; {other}, gives almost none."
         return f"{text}, {chosen.pace / standard.pace:.2g} times as much per second as {other}."
 
@@ -291,7 +282,7 @@ class RigDesign(Proposal):
 def design_rig_test(
     model: Model,
     rivals: Rivals,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     bounded: bool = True,
 ) -> RigDesign | None:
     """The test of the piston of `model` that tells the rivals apart best; `bounded`: in about a
@@ -299,15 +290,15 @@ def design_rig_test(
 
     None where a rig cannot show two of them.
     """
-    bench, settings = VirtualBench(model, ExperimentSettings.rows), RigCourseSettings
+    bench = VirtualBench(model, ExperimentSettings.rows)
     coarse = VirtualBench(model, ExperimentSettings.coarse)
     say("judging the standard tests")
     standards = list(judged_menu(coarse, rivals))
     if not standards:
         return None
-    standard = max(standards, key=lambda j: j.evidence.least)
-    duration = settings.share * standard.log_s
-    duration = float(np.clip(duration, settings.shortest, settings.longest))
+    standard = max(standards, key=lambda j: j.least)
+    duration = SHARE * standard.log_s
+    duration = float(np.clip(duration, SHORTEST, LONGEST))
 
     def worth(point: Array) -> float:
         found = separation(coarse.problem(course(point, duration, bench.stroke)), rivals)
@@ -335,13 +326,13 @@ def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedTest:
     exact = _with_logs(problem, logs)
     fitted = misfit(exact, best_fit(exact, rivals, nearest))
     nats = {**straight.nats, nearest: min(fitted, straight.least)}
-    return JudgedTest(rig, Separation(first, nats), log_time(rig, bench.stroke))
+    return bench.judged(rig, Separation(first, nats))
 
 
 def propose(
     folder: str | Path,
     out: Path,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     bounded: bool = True,
 ) -> RigDesign:
     """The test of a rig that best tells the possible effects of an answer in `folder` apart, a YAML

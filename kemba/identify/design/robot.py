@@ -8,7 +8,7 @@ times, and planning finds the torques.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -37,30 +37,28 @@ from kemba.model.model import Model
 from kemba.model.spec import load_model
 from kemba.plant.controller import PERIOD, execute
 from kemba.plant.repeat import Sensors, take_log
+from kemba.stopwatch import Tell, silent
 from kemba.trajectory import Trajectory
 
-
-class SwaySettings:
-    """What a robot may do in a designed motion."""
-
-    least = 0.03  # smallest lean of the hips [rad]
-    most = 0.25  # largest lean of the hips [rad]: 4 cm of the body
-    # largest acceleration of the body [m.s-2]: feet of the shipped robot slip at about 10
-    acceleration = 8.0
-    leans = 6  # most leans
-    shortest = 0.5  # shortest sway [s]
-    longest = 0.9  # longest sway [s]: plans of up to so long replay without feedback
-    pace = 1.5  # most by which a lean is longer than the one before
-    hold = 0.3  # rest before the motion [s]: as the shipped tasks
-    nodes = 50  # nodes of the task per second: steps of 20 ms
-    fewest = 30  # fewest nodes of the task
-    knee = 0.02  # least height of the knees [m]: as the hop
-    slip = 2e-3  # way of a foot that counts as slipping [m]: boom noise, 6 sigma
-    load = 0.15  # least load of a foot, as a share of half the weight: margin
-    effort = 0.8  # largest torque of a hip, as a share of its peak: margin
-    tried = 12  # motions that are tried: a minute
-    least_tried = 6  # motions that are tried on the slowest machine
-    rows = 500.0  # rows per second of the simulated logs [Hz]
+# What a robot may do in a designed motion.
+LEAST = 0.03  # smallest lean of the hips [rad]
+MOST = 0.25  # largest lean of the hips [rad]: 4 cm of the body
+# largest acceleration of the body [m.s-2]: feet of the shipped robot slip at about 10
+ACCELERATION = 8.0
+LEANS = 6  # most leans
+SHORTEST = 0.5  # shortest sway [s]
+LONGEST = 0.9  # longest sway [s]: plans of up to so long replay without feedback
+PACE = 1.5  # most by which a lean is longer than the one before
+HOLD = 0.3  # rest before the motion [s]: as the shipped tasks
+NODES = 50  # nodes of the task per second: steps of 20 ms
+FEWEST = 30  # fewest nodes of the task
+KNEE = 0.02  # least height of the knees [m]: as the hop
+SLIP = 2e-3  # way of a foot that counts as slipping [m]: boom noise, 6 sigma
+LOAD = 0.15  # least load of a foot, as a share of half the weight: margin
+EFFORT = 0.8  # largest torque of a hip, as a share of its peak: margin
+TRIED = 12  # motions that are tried: a minute
+LEAST_TRIED = 6  # motions that are tried on the slowest machine
+ROWS = 500.0  # rows per second of the simulated logs [Hz]
 
 
 @dataclass(frozen=True)
@@ -97,8 +95,7 @@ class Sway:
 
 def controller(model: Model, sway: Sway) -> Trajectory:
     """The controller's table that sways a robot from its standing pose by its hip gains alone."""
-    settle = SwaySettings.hold
-    times = np.arange(round((settle + sway.duration) / PERIOD) + 1) * PERIOD - settle
+    times = np.arange(round((HOLD + sway.duration) / PERIOD) + 1) * PERIOD - HOLD
     angle, rate = sway.lean(np.clip(times, 0.0, None))
     columns: dict[str, Array] = {}
     for leg in model.mechanism.legs:
@@ -107,13 +104,12 @@ def controller(model: Model, sway: Sway) -> Trajectory:
         columns[f"{leg}/hip/tau [N.m]"] = np.zeros(len(times))
         for valve in ("extend", "retract"):
             columns[f"{leg}/valve/{valve} [1]"] = np.zeros(len(times))
-    return Trajectory(times, columns, {"kind": "controller", "lead": settle})
+    return Trajectory(times, columns, {"kind": "controller", "lead": HOLD})
 
 
 def task(model: Model, name: str, sway: Sway, done: Trajectory, notes: str) -> dict[str, Any]:
     """The task of a sway that was simulated as `done`: the same ways at the same times."""
-    settings = SwaySettings
-    nodes = max(round(settings.nodes * sway.duration), settings.fewest)
+    nodes = max(round(NODES * sway.duration), FEWEST)
     leg = next(iter(model.mechanism.legs))
     still = {"rest": True, "body/x": "0 m", "body/pitch": "0 deg", "*/foot/z": "0 m"}
     hip = float(model.mechanism.standing[f"{leg}/hip/q"])
@@ -129,14 +125,14 @@ def task(model: Model, name: str, sway: Sway, done: Trajectory, notes: str) -> d
         "model": name,
         "duration": f"{sway.duration:.3f} s",
         "nodes": nodes,
-        "hold": f"{settings.hold:g} s",
+        "hold": f"{HOLD:g} s",
         "start": {**still, **pose},
         "end": still,
         "bounds": {
             "*/foot/z": {"at_most": "0 m"},
             "*/piston/x": {"at_most": "0 m"},
             "*/valve/*": {"at_most": 0},
-            "*/knee/z": {"at_least": f"{1e3 * settings.knee:g} mm"},
+            "*/knee/z": {"at_least": f"{1e3 * KNEE:g} mm"},
         },
         "goals": goals,
         "cost": {"torque_squared": 1},
@@ -156,24 +152,21 @@ class Tried(JudgedTest):
 
 
 def _design_motion(
-    model: Model,
-    rivals: Rivals,
-    say: Callable[[str], None] = lambda text: None,
-    bounded: bool = True,
+    model: Model, rivals: Rivals, say: Tell, bounded: bool
 ) -> tuple[Tried, list[Tried], int] | None:
     """The standard sway, all safe ones, the best first, and how many were simulated."""
     if len(model.mechanism.legs) < 2:
         raise KembaError(model.name, "stands on one leg; no safe motion is known for it")
-    settings, search = SwaySettings, DesignSearchSettings
+    search = DesignSearchSettings
     started, count = time.monotonic(), 0
     found: list[Tried] = []
     standard: Tried | None = None
     height = float(model.mechanism.standing["body/z"])
-    rng, even = np.random.default_rng(search.seed), max((2 * settings.tried) // 3, 1)
+    rng, even = np.random.default_rng(search.seed), max((2 * TRIED) // 3, 1)
     cube = qmc.Sobol(4, rng=search.seed).random_base2(int(np.ceil(np.log2(even))))
     points = {STANDARD: np.full(4, 0.5)}
-    while count < settings.tried:  # the standard, some that fill the range, some near the best
-        if bounded and count >= settings.least_tried and time.monotonic() - started > search.budget:
+    while count < TRIED:  # the standard, some that fill the range, some near the best
+        if bounded and count >= LEAST_TRIED and time.monotonic() - started > search.budget:
             break
         if count <= even:
             point = cube[count - 1]
@@ -186,12 +179,12 @@ def _design_motion(
         tried = try_out(model, sway, rivals)
         if tried is None:
             continue
-        if tried.evidence.first == "":
+        if tried.first == "":
             return None
         standard = standard or tried
         found.append(tried)
-        found.sort(key=lambda t: -t.evidence.worth)
-        say(f"{count} motions tried; the best is worth {found[0].evidence.worth:.2f}")
+        found.sort(key=lambda t: -t.worth)
+        say(f"{count} motions tried; the best is worth {found[0].worth:.2f}")
     if standard is None:
         raise KembaError(model.name, "no sway that was tried is safe", "feet that stand, knees up")
     return standard, found, count
@@ -199,15 +192,15 @@ def _design_motion(
 
 def try_out(model: Model, sway: Sway, rivals: Rivals) -> Tried | None:
     """A sway on the simulation; None where it is not safe."""
-    settings = SwaySettings
     try:
-        done = execute(controller(model, sway), model, sample=1.0 / settings.rows).trajectory
+        done = execute(controller(model, sway), model, sample=1.0 / ROWS).trajectory
     except KembaError:
         return None
     if not safe(model, done):
         return None
     log_s = float(done.time[-1] - done.time[0])  # the rest before it included
-    return Tried(sway, expected(model, done, rivals), log_s, done)
+    found = expected(model, done, rivals)
+    return Tried(found.first, found.nats, sway, log_s, done)
 
 
 def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
@@ -220,14 +213,14 @@ def expected(model: Model, done: Trajectory, rivals: Rivals) -> Separation:
 
 def safe(model: Model, done: Trajectory) -> bool:
     """Whether feet stand and carry, knees stay up, and hips have torque to spare, all the time."""
-    settings, legs = SwaySettings, model.mechanism.legs
-    share = 0.5 * model.mechanism.weight * settings.load
+    legs = model.mechanism.legs
+    share = 0.5 * model.mechanism.weight * LOAD
     peak = {e.on: e.tau_peak for e in model.effects if isinstance(e, Motor)}
     for leg in legs:
-        most = settings.effort * peak.get(leg, peak.get(None, np.inf))
-        if np.ptp(done[f"{leg}/foot/x"]) > settings.slip or done[f"{leg}/foot/Fz"].min() < share:
+        most = EFFORT * peak.get(leg, peak.get(None, np.inf))
+        if np.ptp(done[f"{leg}/foot/x"]) > SLIP or done[f"{leg}/foot/Fz"].min() < share:
             return False
-        if done[f"{leg}/knee/z"].min() < settings.knee:
+        if done[f"{leg}/knee/z"].min() < KNEE:
             return False
         if np.abs(done[f"{leg}/hip/tau"]).max() > most:
             return False
@@ -236,17 +229,16 @@ def safe(model: Model, done: Trajectory) -> bool:
 
 def _sway(point: Array, height: float) -> Sway:
     """The sway of a point (4,) of the unit cube, its acceleration limited for hips at `height`."""
-    s = SwaySettings
     plain = Sway(
         angle=1.0,
-        leans=1 + min(int(point[1] * s.leans), s.leans - 1),
-        duration=round(s.shortest + (s.longest - s.shortest) * float(point[2]), 3),
-        pace=round(s.pace ** (2.0 * float(point[3]) - 1.0), 4),
+        leans=1 + min(int(point[1] * LEANS), LEANS - 1),
+        duration=round(SHORTEST + (LONGEST - SHORTEST) * float(point[2]), 3),
+        pace=round(PACE ** (2.0 * float(point[3]) - 1.0), 4),
     )
     _, rate = plain.lean(np.linspace(0.0, plain.duration, 500))
     fastest = float(np.abs(np.gradient(rate, plain.duration / 499)).max())
-    angle = s.least * (s.most / s.least) ** float(point[0])
-    return replace(plain, angle=round(min(angle, s.acceleration / (height * fastest)), 4))
+    angle = LEAST * (MOST / LEAST) ** float(point[0])
+    return replace(plain, angle=round(min(angle, ACCELERATION / (height * fastest)), 4))
 
 
 @dataclass(frozen=True)
@@ -295,14 +287,14 @@ class MotionProposal(Proposal):
 
     def nats_of(self, run: str | Path) -> float:
         """Expected evidence [nats] of the plan in a run folder."""
-        done = execute(run, self.model, sample=1.0 / SwaySettings.rows).trajectory
+        done = execute(run, self.model, sample=1.0 / ROWS).trajectory
         return expected(self.model, done, self.rivals).least
 
 
 def propose_motion(
     folder: str | Path,
     out: Path,
-    say: Callable[[str], None] = lambda text: None,
+    say: Tell = silent,
     bounded: bool = True,
 ) -> MotionProposal:
     """The safe motion that best tells the possible effects of an answer apart, a task in `out`.

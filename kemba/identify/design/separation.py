@@ -120,28 +120,27 @@ class Separation:
         clear = ExperimentSettings.clear
         return float(sum(np.log1p(n / clear) for n in self.nats.values()))
 
-    def json(self, log_s: float) -> dict[str, Any]:
-        """The figures for logs of `log_s` [s]."""
-        return {
-            "nats": self.least,
-            "nats_by_rival": dict(self.nats),
-            "log_s": log_s,
-            "nats_per_s": self.least / log_s,
-        }
-
 
 @dataclass(frozen=True)
-class JudgedTest:
+class JudgedTest(Separation):
     """A test, the evidence that its log is expected to hold, and the seconds of that log."""
 
     test: Any
-    evidence: Separation
     log_s: float
 
     @property
     def pace(self) -> float:
         """Expected evidence [nats] per second of log."""
-        return self.evidence.least / self.log_s
+        return self.least / self.log_s
+
+    def json(self) -> dict[str, Any]:
+        """The figures of the test."""
+        return {
+            "nats": self.least,
+            "nats_by_rival": dict(self.nats),
+            "log_s": self.log_s,
+            "nats_per_s": self.pace,
+        }
 
 
 @dataclass(frozen=True)
@@ -160,12 +159,12 @@ class Proposal(ABC):
     @property
     def nats(self) -> float:
         """Expected evidence [nats] of it between the two effects that are hardest to separate."""
-        return self.chosen.evidence.least
+        return self.chosen.least
 
     @property
     def pair(self) -> tuple[str, str]:
         """These two effects."""
-        return self.chosen.evidence.first, self.chosen.evidence.nearest
+        return self.chosen.first, self.chosen.nearest
 
     @property
     @abstractmethod
@@ -180,8 +179,8 @@ class Proposal(ABC):
             "sentence": self.sentence,
             "strength": strength(self.nats),
             "log_s": self.chosen.log_s,
-            "designed": self.designed.evidence.json(self.designed.log_s),
-            "standard": self.standard.evidence.json(self.standard.log_s),
+            "designed": self.designed.json(),
+            "standard": self.standard.json(),
             "tried": self.tried,
         }
 

@@ -11,24 +11,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.linear import Linear, precision_factor
+from kemba.identify.infer.linear import NULL, Hypothesis, Linear, precision_factor
 from kemba.identify.infer.null_model import LinearisationPoint, effect_bounds
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
 from kemba.identify.infer.windows import START, error_ratio
 from kemba.identify.problem.problem import Array, Labels, Problem, Theta
 
-
-class CrossValidationSettings:
-    """When left-out data refute an answer."""
-
-    refuted = 2.0  # loss on left-out data, beyond its standard error, that refutes an answer [nats]
-    tolerated = 3.0  # prior sigmas by which a nominal figure may be off: three sigmas
-    # share, in one run, of what tells two hypotheses apart, from which quarters of runs are left
-    # out instead of runs
-    alone = 0.9
-    none = 1e-6  # width of the spike of absent effects: none, but not singular
-    free = 1e6  # prior sigmas by which an effect may be off: no bound
+# When left-out data refute an answer.
+REFUTED = 2.0  # loss on left-out data, beyond its standard error, that refutes an answer [nats]
+TOLERATED = 3.0  # prior sigmas by which a nominal figure may be off: three sigmas
+# share, in one run, of what tells two hypotheses apart, from which quarters of runs are left
+# out instead of runs
+ALONE = 0.9
+NONE = 1e-6  # width of the spike of absent effects: none, but not singular
+FREE = 1e6  # prior sigmas by which an effect may be off: no bound
 
 
 @dataclass(frozen=True)
@@ -41,7 +37,7 @@ class Gain:
     @property
     def refuted(self) -> bool:
         """Whether left-out data speak against it, by more than their scatter."""
-        return self.nats + self.error < -CrossValidationSettings.refuted
+        return self.nats + self.error < -REFUTED
 
     @property
     def pays(self) -> bool:
@@ -53,7 +49,7 @@ def one_part_shows(search: Search, hypothesis: Hypothesis, against: Hypothesis =
     """Whether one part of the logs alone can tell two hypotheses apart, so that what remains
     without that part says nothing of it."""
     distances = _distances(search, hypothesis, against)
-    return bool(distances.max() > CrossValidationSettings.alone * distances.sum())
+    return bool(distances.max() > ALONE * distances.sum())
 
 
 def _distances(
@@ -69,7 +65,7 @@ def _distances(
 
 def folds(search: Search, fine: bool) -> Labels:
     """Which blocks (b,) of the logs are left out together: runs, as a rule; `fine`: quarters."""
-    parts = search.base.division.parts
+    parts = search.base.parts
     return np.arange(len(parts)) if fine else parts
 
 
@@ -138,14 +134,13 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     Effects of the hypothesis stay within their bounds, as in a refit: a delay that ends at its
     bound would else be judged where no valve can be.
     """
-    settings = CrossValidationSettings
-    ranker = search.base.ranker(linear, spike=settings.none)
+    ranker = search.base.ranker(linear, spike=NONE)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
     shift = (linear.mean - linear.at) / width
     lower = precision_factor(gram, width)
     target = np.linalg.solve(lower, shift - width * slope)
-    reach = np.where(ranker.nuisance, settings.tolerated, settings.free)
+    reach = np.where(ranker.nuisance, TOLERATED, FREE)
     least, most = effect_bounds(search.problem, linear.names, hypothesis)
     least = np.maximum((least - linear.at) / width, shift - reach)
     most = np.minimum((most - linear.at) / width, shift + reach)

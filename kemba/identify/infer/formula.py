@@ -5,10 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kemba.identify.infer.linear import condense
+from kemba.identify.infer.linear import NULL, Hypothesis, Ranker, condense
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.significance import BootstrapSettings, bootstrap, redrawn_noise
-from kemba.identify.infer.spike_slab import NULL, Hypothesis, Ranker
+from kemba.identify.infer.significance import RARE, bootstrap, redrawn_noise
 from kemba.identify.problem.noise import drift_waves
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem
 
@@ -86,7 +85,7 @@ def extended(search: Search, formulas: Mapping[str, Array]) -> tuple[Ranker, Arr
         np.concatenate([linear.width, widths, sigmas]),
         jacobian,
         mode.residual,
-        search.base.division.blocks,
+        search.base.blocks,
     )
     problem = search.problem
     known = {**problem.candidates, **candidates}
@@ -99,7 +98,7 @@ def by_chance(count: int) -> float:
     A Bayes factor exceeds exp(g) with a probability of exp(-g) at most where its term is not there
     (Markov's inequality); `count` of them do so with `count` times that probability at most.
     """
-    return float(np.log(count / BootstrapSettings.rare))
+    return float(np.log(count / RARE))
 
 
 def look(search: Search, best: Hypothesis) -> Formula | None:

@@ -26,14 +26,12 @@ from scipy.special import chdtrc, stdtrit
 
 from kemba.errors import enumerated
 from kemba.identify.answer import Covariance, Value
-from kemba.identify.infer.linear import is_shape, time_blocks
+from kemba.identify.infer.linear import Hypothesis, SpikeSlabSettings, is_shape, time_blocks
 from kemba.identify.infer.refit import Frozen, refit
-from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
 from kemba.identify.infer.windows import START
-from kemba.identify.problem.candidates import LINK
+from kemba.identify.problem.candidates import LINK, ORIFICE
 from kemba.identify.problem.problem import Array, Candidate, Labels, Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
-from kemba.identify.problem.structure import ORIFICE
 from kemba.model.model import Model
 
 BLOCKS = (12, 24, 48)  # of time, at least; with fewer than 12 the scatter itself is not known

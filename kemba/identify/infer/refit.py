@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.spike_slab import Hypothesis, SpikeSlabSettings
+from kemba.identify.infer.linear import Hypothesis, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Problem, bounded
 
 
@@ -90,14 +90,14 @@ class _LeastSquares:
         self.own = {key: p for e in hypothesis for key, p in problem.candidates[e].keys().items()}
         self.names, self.count = (*frozen.names, *self.own), len(frozen.names)
         self.curved = [n for n in problem.curved if n in frozen.names]
-        self.settings, slab = RefitSettings, SpikeSlabSettings.slab
+        slab = SpikeSlabSettings.slab
         switches = {problem.candidates[e].key for e in hypothesis}
         self.shape = np.array([n in self.own and n not in switches for n in self.names], dtype=bool)
         priors = [problem.nuisance[name] for name in frozen.names]
         priors += [(p.off, slab * p.size) if key in switches else (p.typical, p.size)
                    for key, p in self.own.items()]  # fmt: skip
         self.centre, self.width = np.array(priors).reshape(-1, 2).T
-        far = np.array([self.settings.large if n in switches else self.settings.bound
+        far = np.array([RefitSettings.large if n in switches else RefitSettings.bound
                         for n in self.names])  # fmt: skip
         ends = [problem.limits(name) for name in frozen.names]
         ends += [(p.lower, p.upper) for p in self.own.values()]
@@ -110,7 +110,7 @@ class _LeastSquares:
         )
 
     def run(self) -> Fit:
-        settings = self.settings
+        settings = RefitSettings
         lower, upper = self.lower + INSIDE, self.upper - INSIDE
         x = np.clip(self._in(self.start), lower, upper)
         r, damping = self._residual(x), 0.0
@@ -156,11 +156,11 @@ class _LeastSquares:
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def _residual(self, x: Array) -> Array:
-        return bounded(self.problem.residual(self._theta(x)), self.settings.absurd)
+        return bounded(self.problem.residual(self._theta(x)), RefitSettings.absurd)
 
     def _slopes(self, x: Array, r: Array) -> tuple[Array, Array]:
         """Which of x (k,) have slopes of their own (curved, or effects), and these (n, c)."""
-        n, settings = self.count, self.settings
+        n, settings = self.count, RefitSettings
         curved = [self.names.index(name) for name in self.curved]
         at = np.array([*curved, *range(n, len(x))], dtype=int)
         parts = []

@@ -1,43 +1,46 @@
 """The search: fit of the null, ranking, refits of the leaders, further effects one by one."""
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from kemba.identify.infer.linear import estimate, names_of
+from kemba.identify.infer.linear import (
+    NULL,
+    Hypothesis,
+    estimate,
+    log_prior,
+    names_of,
+    probabilities,
+)
 from kemba.identify.infer.null_model import Baseline, LinearisationPoint, with_learnt_colour
 from kemba.identify.infer.refit import Fit, Frozen, refit
-from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior, probabilities
 from kemba.identify.problem.problem import Problem, Theta
-from kemba.stopwatch import Stage
+from kemba.stopwatch import Stage, Tell, silent
 
-
-class SearchSettings:
-    """Which hypotheses are refitted."""
-
-    leaders = 6  # effects that are refitted in a round
-    sure = 3  # leaders that are refitted however far behind they are
-    sure_grown = 2  # the same beside effects that are found already
-    far = 40.0  # other leaders are refitted when not farther behind [nats]
-    # error of the model as it is, in noise units, from which another structure is refitted whatever
-    # its linear evidence is
-    structural = 1.3
-    far_share = 0.7  # or no farther behind than this share of the gain
-    promising = 0.5  # share of the best gain with which an effect is tried again
-    followed = 2  # times that the motion is found again with the best guess
-    # times that the motion is found before a search along it, until late sensors stay as late: a
-    # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
-    # second one after it
-    settled = 4
-    still = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
-    largest = 10  # effects in one answer: more than any machine is expected to lack
-    regrown = 3  # times that an answer of several effects is begun again where it has led
-    swapped = 2  # rounds in which effects of an answer are taken away or swapped
-    leaders_grown = 3  # effects that are refitted beside the best answer
-    leaders_swapped = 2  # effects that are refitted in place of one of the answer
-    far_off = 0.1  # size of an effect from which its secant replaces its slope
+# Which hypotheses are refitted.
+LEADERS = 6  # effects that are refitted in a round
+SURE = 3  # leaders that are refitted however far behind they are
+SURE_GROWN = 2  # the same beside effects that are found already
+FAR = 40.0  # other leaders are refitted when not farther behind [nats]
+# error of the model as it is, in noise units, from which another structure is refitted whatever
+# its linear evidence is
+STRUCTURAL = 1.3
+FAR_SHARE = 0.7  # or no farther behind than this share of the gain
+PROMISING = 0.5  # share of the best gain with which an effect is tried again
+FOLLOWED = 2  # times that the motion is found again with the best guess
+# times that the motion is found before a search along it, until late sensors stay as late: a
+# piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
+# second one after it
+SETTLED = 4
+STILL = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
+LARGEST = 10  # effects in one answer: more than any machine is expected to lack
+REGROWN = 3  # times that an answer of several effects is begun again where it has led
+SWAPPED = 2  # rounds in which effects of an answer are taken away or swapped
+LEADERS_GROWN = 3  # effects that are refitted beside the best answer
+LEADERS_SWAPPED = 2  # effects that are refitted in place of one of the answer
+FAR_OFF = 0.1  # size of an effect from which its secant replaces its slope
 
 
 @dataclass
@@ -55,7 +58,7 @@ class Search:
 
     problem: Problem
     deadline: float = np.inf
-    say: Callable[[str], None] = lambda text: None
+    say: Tell = silent
     points: dict[Hypothesis, LinearisationPoint] = field(default_factory=dict)
     begin: Mapping[str, float] = field(default_factory=dict)
     due: float = np.inf
@@ -77,17 +80,12 @@ class Search:
 
     def run(self) -> Hypothesis:
         """The likeliest hypothesis; everything that was refitted stays in `points`."""
-        self.prepare()
-        return self.further(self.first())
-
-    def prepare(self) -> None:
-        """The null model, before anything is looked for."""
-        self.say("fitting the model as it is, and a slope for every effect")
         self.start()
+        return self.further(self.first())
 
     def first(self) -> Hypothesis:
         """The first guess: the best of the single effects that look best."""
-        best = self._round(NULL, SearchSettings.leaders)
+        best = self._round(NULL, LEADERS)
         self.say(f"first guess: {' + '.join(best) or 'nothing'}")
         return best
 
@@ -98,24 +96,24 @@ class Search:
         if best != NULL:
             null = self.points[NULL].log_evidence
             gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-            least = SearchSettings.promising * max(gains.values())
+            least = PROMISING * max(gains.values())
             promising = [h for h, gain in gains.items() if gain > least]
             self.base.seen_from(self.points[best].fit.theta)
             self.problem = self.base.problem
             self.points = {NULL: self.base.point}
             for number, hypothesis in enumerate(promising, start=1):
                 self.visit(hypothesis, number, len(promising))
-            best = self._round(NULL, SearchSettings.leaders)
+            best = self._round(NULL, LEADERS)
         return self._swap(self._grow(best)) if best else best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
         """Repeat the search along the motion that the best hypothesis makes, until it stays."""
-        for _ in range(SearchSettings.followed):
+        for _ in range(FOLLOWED):
             if best == NULL or self.ended:
                 return best
             before = best
             self._along(best)
-            best = self._round(NULL, SearchSettings.leaders)
+            best = self._round(NULL, LEADERS)
             if best == before:
                 break
         return self._swap(self._regrow(self._grow(best))) if best else best
@@ -128,7 +126,7 @@ class Search:
 
     def _regrow(self, best: Hypothesis) -> Hypothesis:
         """Find the motion again with several effects, each of which changes it, and grow."""
-        for _ in range(SearchSettings.regrown):
+        for _ in range(REGROWN):
             if len(best) < 2 or self.ended:
                 break
             before = best
@@ -140,9 +138,9 @@ class Search:
 
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
         """Find the motion of a hypothesis until late sensors stay as late; the best theta."""
-        settings, theta = SearchSettings, self.points[hypothesis].fit.theta
+        theta = self.points[hypothesis].fit.theta
         asked = self.problem
-        for _ in range(settings.settled):
+        for _ in range(SETTLED):
             self.problem = self.problem.relinearise(theta)
             late = self.problem.held_back(theta)
             if not late or self.ended:
@@ -153,12 +151,14 @@ class Search:
             theta = refit(self.problem, hypothesis, theta, slopes).theta
             self._thetas[hypothesis] = dict(theta)
             moved = max(abs(theta[name] - before[name]) for name in late)
-            if moved < settings.still * self.problem.interval:
+            if moved < STILL * self.problem.interval:
                 break
         return theta
 
     def start(self, theta: Mapping[str, float] | None = None) -> None:
         """Null fit, noise colour, and the linear table at the null; `theta`: the best guess."""
+        if theta is None:
+            self.say("fitting the model as it is, and a slope for every effect")
         if self.problem.moves:
             about = theta or self.begin
             self.problem = with_learnt_colour(self.problem, about, careful=bool(theta))
@@ -168,14 +168,13 @@ class Search:
 
     def _round(self, given: Hypothesis, leaders: int, least: float = -np.inf) -> Hypothesis:
         """Refit `given` with one more effect, of the likeliest ones; the best of all points."""
-        settings = SearchSettings
         table = self.base.table
         if given:  # linear evidence of it and one more effect
             table = self.base.ranker(self.points[given].mode.linear).table(given)
         order = sorted(table, key=lambda h: -table[h])[:leaders]
         gain = table[order[0]] - self.points[given].log_evidence
-        reach = max(settings.far, settings.far_share * gain)
-        sure = settings.sure_grown if given else settings.sure
+        reach = max(FAR, FAR_SHARE * gain)
+        sure = SURE_GROWN if given else SURE
         for number, hypothesis in enumerate(order, start=1):
             if table[hypothesis] < least:
                 break
@@ -186,16 +185,15 @@ class Search:
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
-        if given == NULL and self.points[NULL].fitted_error > settings.structural:
+        if given == NULL and self.points[NULL].fitted_error > STRUCTURAL:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
         return self.best()
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
-        settings = SearchSettings
-        while len(best) < settings.largest and not self.ended:
-            grown = self._round(best, settings.leaders_grown)
+        while len(best) < LARGEST and not self.ended:
+            grown = self._round(best, LEADERS_GROWN)
             if grown == best or len(grown) <= len(best):
                 break
             best = grown
@@ -203,16 +201,15 @@ class Search:
 
     def _swap(self, best: Hypothesis) -> Hypothesis:
         """Take each effect away, or swap it for another; what was swapped may grow again."""
-        settings = SearchSettings
-        for _ in range(settings.swapped):
+        for _ in range(SWAPPED):
             before = best
             for member in best if len(best) > 1 else ():
                 if self.ended:
                     return self.best()
                 rest = tuple(h for h in best if h != member)
                 self.visit(rest)
-                least = self.points[best].log_evidence - settings.far
-                self._round(rest, settings.leaders_swapped, least)
+                least = self.points[best].log_evidence - FAR
+                self._round(rest, LEADERS_SWAPPED, least)
             best = self.best()
             if best == before or self.ended:
                 break
@@ -237,7 +234,7 @@ class Search:
         if others or not problem.moves or problem.is_straight(candidate.key):
             return
         size = fit.theta[candidate.key] - candidate.lead.off
-        if abs(size) > SearchSettings.far_off * candidate.lead.size:
+        if abs(size) > FAR_OFF * candidate.lead.size:
             own = set(candidate.keys())
             absent = {k: v for k, v in fit.theta.items() if k not in own}
             change = problem.residual(fit.theta) - problem.residual(absent)

@@ -30,9 +30,9 @@ from kemba.identify.infer.cross_validation import (
     window_powers,
 )
 from kemba.identify.infer.joint import JointFit, joint_estimate
+from kemba.identify.infer.linear import NULL, Hypothesis, log_prior
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.significance import BootstrapSettings
-from kemba.identify.infer.spike_slab import NULL, Hypothesis, log_prior
+from kemba.identify.infer.significance import LEAST
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import is_fault
@@ -158,7 +158,7 @@ def is_unsupported(search: Search, best: Hypothesis) -> bool:
     an answer than their scatter. Its p-value counts rows, whose noise may be slower than it is
     taken to be."""
     gain = gain_over_nothing(search, best)
-    return not gain.pays or gain.nats < BootstrapSettings.least
+    return not gain.pays or gain.nats < LEAST
 
 
 def _nothing_selected(selection: Selection) -> Selection:
@@ -175,7 +175,7 @@ def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     """Whether a hypothesis predicts left-out data as well as the `best`: within one standard error
     of it, or with less than any evidence between them."""
     gain = window_gain(search, best, hypothesis)
-    return not gain.pays or gain.nats < BootstrapSettings.least
+    return not gain.pays or gain.nats < LEAST
 
 
 def _is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:

@@ -8,47 +8,49 @@ against B is half of s^2 times the information about A that is left when B is fr
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse.csgraph import connected_components
-from scipy.special import log_ndtr, logsumexp
 
 from kemba.errors import enumerated
 from kemba.identify.answer import DiscoverSettings
-from kemba.identify.infer.linear import Linear, precision_factor, time_blocks
+from kemba.identify.infer.linear import (
+    NULL,
+    Linear,
+    Ranker,
+    SpikeSlabSettings,
+    precision_factor,
+    time_blocks,
+)
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Ranker, SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Labels
 
-
-class BootstrapSettings:
-    """The test whether anything is missing."""
-
-    # number of simulated logs: twelve of them lie beyond the p-value asked for, so that it is known
-    # to a third
-    draws = 400
-    # share of simulated logs that reach a threshold by chance: one in fifty; stricter than
-    # DiscoverSettings.significant, since no left-out data are asked about formulas and detectable
-    # sizes
-    rare = 0.02
-    least = 1.0  # smallest threshold of the log evidence [nats]: evidence of one nat
-    # share of what the prior tells of an effect, below which data tell nothing of it: rounding
-    # alone leaves about 1e-10, as of a place along level ground
-    silent = 1e-6
+# The test whether anything is missing.
+# number of simulated logs: twelve of them lie beyond the p-value asked for, so that it is known
+# to a third
+DRAWS = 400
+# share of simulated logs that reach a threshold by chance: one in fifty; stricter than
+# DiscoverSettings.significant, since no left-out data are asked about formulas and detectable
+# sizes
+RARE = 0.02
+LEAST = 1.0  # smallest threshold of the log evidence [nats]: evidence of one nat
+# share of what the prior tells of an effect, below which data tell nothing of it: rounding
+# alone leaves about 1e-10, as of a place along level ground
+SILENT = 1e-6
 
 
 @dataclass(frozen=True)
 class NullTest:
     """The best score that a single effect reaches in logs in which nothing is missing.
 
-    `scores` (draws,): its log evidence less that of nothing [nats]. `names` of the parameters.
-    `blocks`: pieces of the logs whose signs were redrawn.
+    `scores` (draws,): its log evidence less that of nothing [nats]. `blocks`: pieces of the logs
+    whose signs were redrawn.
     """
 
     scores: Array
-    names: tuple[str, ...]
     blocks: int
 
     def p_value(self, score: float) -> float:
@@ -78,8 +80,7 @@ class NullTest:
     @property
     def threshold(self) -> float:
         """Log evidence that such logs reach rarely."""
-        settings = BootstrapSettings
-        return float(max(np.quantile(self.scores, 1.0 - settings.rare), settings.least))
+        return float(max(np.quantile(self.scores, 1.0 - RARE), LEAST))
 
 
 def bootstrap(ranker: Ranker, noise: Array, effects: Sequence[str]) -> NullTest:
@@ -90,41 +91,23 @@ def bootstrap(ranker: Ranker, noise: Array, effects: Sequence[str]) -> NullTest:
     k): J'e of short blocks of the error of a flexible model. A block keeps the colour of the
     noise; a random sign of each block makes new noise.
     """
-    slopes = _slopes(ranker, noise)
-    parts = [_evidence(ranker, effects, slopes, t) for t in SpikeSlabSettings.tolerances]
-    nothing, *single = logsumexp(parts, axis=0)
-    return NullTest(np.max(single - nothing, axis=0), ranker.linear.names, len(noise))
+    about = copy(ranker)  # the prior mean
+    about.linear = replace(ranker.linear, at=ranker.linear.mean)
+    nothing, *single = about.beside(NULL, effects, _slopes(ranker, noise))
+    return NullTest(np.max(single - nothing, axis=0), len(noise))
 
 
 def _slopes(ranker: Ranker, noise: Array) -> Array:
     """J'r (k, draws) of logs in which nothing is missing, at the prior mean."""
-    linear, draws, rng = ranker.linear, BootstrapSettings.draws, np.random.default_rng(0)
-    signs = rng.choice([-1.0, 1.0], size=(draws, len(noise)))
-    tolerance = rng.choice(SpikeSlabSettings.tolerances, size=draws)
-    truth = rng.standard_normal((draws, len(linear.width))) * ranker.widths((), 1.0)
+    linear, rng = ranker.linear, np.random.default_rng(0)
+    signs = rng.choice([-1.0, 1.0], size=(DRAWS, len(noise)))
+    tolerance = rng.choice(SpikeSlabSettings.tolerances, size=DRAWS)
+    truth = rng.standard_normal((DRAWS, len(linear.width))) * ranker.widths((), 1.0)
     truth[:, ranker.figures] *= tolerance[:, None]
     for effect, i in ranker.lead.items():
         if not ranker.candidates[effect].lead.signed:
             truth[:, i] = np.abs(truth[:, i])
     return np.asarray((-(truth @ linear.gram.sum(axis=0)) + signs @ noise).T)
-
-
-def _evidence(ranker: Ranker, effects: Sequence[str], slopes: Array, tolerance: float) -> Array:
-    """Log evidence (1 + e, draws) of nothing and of each effect alone (Sherman, Morrison)."""
-    width, wide = (ranker.widths(h, tolerance) for h in ((), tuple(effects)))
-    lower = precision_factor(ranker.linear.gram.sum(axis=0), width)
-    root = solve_triangular(lower, np.diag(width), lower=True)
-    covariance = root.T @ root
-    step = -covariance @ slopes
-    nothing = -0.5 * np.sum(slopes * step, axis=0) - np.sum(np.log(np.diag(lower)))
-    i = [ranker.lead[e] for e in effects]
-    step, variance = step[i], covariance[i, i][:, None]
-    delta = (wide[i] ** -2.0 - width[i] ** -2.0)[:, None]
-    grows = 1.0 + variance * delta  # of precision
-    gain = -0.5 * (delta / grows * step**2 + np.log(grows)) - np.log(wide[i] / width[i])[:, None]
-    signed = [[ranker.candidates[e].lead.signed] for e in effects]
-    side = np.log(2.0) + log_ndtr(step / np.sqrt(variance * grows))
-    return np.vstack([nothing, nothing + gain + np.where(signed, 0.0, side)])
 
 
 def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | None]:
@@ -136,7 +119,7 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | N
         size = ranker.candidates[effect].lead.size
         wide, little = prior.slab * size, prior.spike * size
         told = 1.0 / covariance[i, i] - 1.0 / little**2
-        if told * wide**2 < BootstrapSettings.silent:
+        if told * wide**2 < SILENT:
             found[effect] = None
             continue
         variance = 1.0 / told
@@ -147,19 +130,17 @@ def smallest_detectable(ranker: Ranker, threshold: float) -> dict[str, float | N
     return found
 
 
-class LeftOutNoiseSettings:
-    """How much of the noise a fit may have taken for effects."""
-
-    # largest factor by which what is left of a block is enlarged: of what acts in one block only
-    # nobody can tell whether it is noise
-    most = 4.0
-    # of (I - H)^-1, by which what is left is enlarged; 1: errors of left-out data; 200 bench
-    # machines, whose noise then has 3.5 instead of 4.0 times its power
-    power = 1.0
-    # the same where the motion depends on the model; 0.5: power of white noise; robot logs with
-    # noise of 10 ms; with 1 hidden effects had p of 0.08 and 0.13, with 0.5 0.0025 to 0.012, logs
-    # of a clean robot 1.0 by both
-    power_in_motion = 0.5
+# How much of the noise a fit may have taken for effects.
+# largest factor by which what is left of a block is enlarged: of what acts in one block only
+# nobody can tell whether it is noise
+MOST = 4.0
+# of (I - H)^-1, by which what is left is enlarged; 1: errors of left-out data; 200 bench
+# machines, whose noise then has 3.5 instead of 4.0 times its power
+POWER = 1.0
+# the same where the motion depends on the model; 0.5: power of white noise; robot logs with
+# noise of 10 ms; with 1 hidden effects had p of 0.08 and 0.13, with 0.5 0.0025 to 0.012, logs
+# of a clean robot 1.0 by both
+POWER_IN_MOTION = 0.5
 
 
 def left_out_noise(
@@ -184,8 +165,7 @@ def _enlarged(own: Array, left: Array, root: Array, power: float) -> Array:
     """(I - H)^-power J'e (k,) of one block, by the directions of its share H in what is known."""
     seen = solve_triangular(root, own.T, lower=True)
     share, directions = np.linalg.eigh(seen @ seen.T)
-    most = LeftOutNoiseSettings.most
-    factor = np.clip(1.0 - share, 1.0 / most, 1.0) ** -power
+    factor = np.clip(1.0 - share, 1.0 / MOST, 1.0) ** -power
     return np.asarray(directions @ (factor * (directions.T @ (seen @ left))))
 
 
@@ -216,10 +196,10 @@ def null_test(search: Search) -> NullTest:
 def redrawn_noise(search: Search, linear: Linear, jacobian: Array) -> Array:
     """J'e (b, k) of short blocks of what a fit of everything in `linear`, with slopes (n, k),
     leaves of the null's residual: noise for the bootstrap."""
-    problem, settings = search.problem, LeftOutNoiseSettings
+    problem = search.problem
     left = search.points[NULL].mode.residual + jacobian @ (linear.best() - linear.at)
     blocks = time_blocks(problem, shortest=DiscoverSettings.fine)
-    power = settings.power_in_motion if problem.moves else settings.power
+    power = POWER_IN_MOTION if problem.moves else POWER
     return left_out_noise(jacobian, left, linear.width, blocks, power)
 
 

@@ -16,10 +16,9 @@ from scipy.special import expit
 from kemba.identify.answer import Answer, Ranked, Value, Verdict, VerdictSettings, phrase
 from kemba.identify.infer.cross_validation import left_out
 from kemba.identify.infer.joint import JointFit
-from kemba.identify.infer.linear import linearise, names_of, time_blocks
+from kemba.identify.infer.linear import NULL, Hypothesis, linearise, names_of, share_of, time_blocks
 from kemba.identify.infer.refit import Frozen, refit
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL, Hypothesis, share_of
 from kemba.identify.infer.verdict import rest_of
 from kemba.identify.infer.windows import error_ratio, excess
 from kemba.identify.problem.problem import Problem

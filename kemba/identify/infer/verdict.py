@@ -1,26 +1,29 @@
-"""What may be said of a finished search: why its answer is not complete (error that repeats itself,
-patterns of force), the verdict, and what to measure next."""
+"""What may be said of a finished search: the effects in order of probability, with their parameters
+and equivalents; why the answer is not complete (error that repeats itself, patterns of force); the
+verdict, and what to measure next.
+"""
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from kemba.effects.rigs.axis import DriveAxis
 from kemba.errors import enumerated
-from kemba.identify.answer import ENDED, Ranked, Verdict, VerdictSettings
+from kemba.identify.answer import ENDED, Ranked, Value, Verdict, VerdictSettings
 from kemba.identify.compare.bins import BinSettings
 from kemba.identify.compare.compare import conditions
-from kemba.identify.compare.force_profiles import ForceProfileSettings, force_profiles
+from kemba.identify.compare.force_profiles import NEGLIGIBLE, PLAIN, force_profiles
 from kemba.identify.compare.hints import lacking
 from kemba.identify.compare.words import place_of
-from kemba.identify.infer.cross_validation import HeldOut, error
+from kemba.identify.infer.cross_validation import HeldOut, error, error_as_it_is, left_out
 from kemba.identify.infer.formula import Formula
 from kemba.identify.infer.joint import RIG_FIGURES, JointFit, given_figure
-from kemba.identify.infer.ranking import values
+from kemba.identify.infer.linear import NULL, Hypothesis, SpikeSlabSettings, is_shape, share_of
+from kemba.identify.infer.null_model import within_bounds
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.selection import Selection
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
+from kemba.identify.infer.selection import Selection, strength
 from kemba.identify.infer.windows import excess
 from kemba.identify.logs.gate import unit_in_doubt
 from kemba.identify.problem.problem import Array, Labels
@@ -28,12 +31,128 @@ from kemba.identify.problem.sensor_faults import is_fault
 from kemba.model.model import Model
 from kemba.units import short
 
+# two explanations are equivalent when their evidence differs by less [nats]: Kass and Raftery
+# 1995, 'strong' evidence begins at 3 nats
+SAME = 3.0
+SHOWN = 8  # effects in the ranking: fits a screen
+# largest probability of all effects together where nothing is significant: nothing is then the
+# likeliest
+DOUBTED = 0.5
+
+
+def ranked(
+    search: Search,
+    selection: Selection,
+    kept: HeldOut | None,
+    whole: Hypothesis = NULL,
+    joint: JointFit | None = None,
+) -> list[Ranked]:
+    """The effects in order of probability; those of the selected hypothesis first, then the
+    others of the `whole` that is written, with what the `joint` fit says of them."""
+    problem, best = search.problem, selection.best
+    probability = search.probabilities(selection.dismissed if best else ())
+    if not best:  # where nothing was found significant, nothing is the likeliest
+        rest = sum(p for h, p in probability.items() if h)
+        scale = min(1.0, DOUBTED / rest) if rest > 0 else 1.0
+        probability = {h: p * scale if h else 1.0 - rest * scale for h, p in probability.items()}
+    shares = share_of(probability, problem.candidates)
+    order = sorted(
+        shares,
+        key=lambda e: (e not in best, e not in whole, -strength(search, e, best), -shares[e]),
+    )
+    found = []
+    before = error(search, NULL, kept)
+    for effect in order[: max(SHOWN, len(whole))]:
+        written = joint is not None and effect in whole
+        hypothesis = (whole if written else best) if effect in {*whole, *best} else NULL
+        if not hypothesis:  # alone, if it was refitted; else the likeliest one that has it
+            having = [h for h in search.points if effect in h]
+            alone = [(effect,)] if (effect,) in having else having
+            hypothesis = max(alone, key=lambda h: search.points[h].log_evidence, default=NULL)
+        if not hypothesis:
+            continue
+        if joint is not None and written:
+            told = joint.values(problem.candidates[effect])
+        else:
+            told = values(search, hypothesis, effect)
+        alike = equivalents(search, selection, effect) if effect in best else ()
+        after, gain = error(search, hypothesis, kept), left_out(search, hypothesis).nats
+        found.append(Ranked(effect, shares[effect], told, alike, before, after, gain))
+    return found
+
+
+def equivalents(search: Search, selection: Selection, effect: str) -> tuple[str, ...]:
+    """Effects that could stand in this one's place in the answer: they explain the data, or predict
+    left-out data, as well."""
+    hypothesis = selection.best
+    own, same = search.points[hypothesis].log_evidence, SAME
+    near = {h for h, p in search.points.items() if own - p.log_evidence < same}
+    rest = set(hypothesis) - {effect}
+    found: set[str] = set()
+    for other in (near - selection.dismissed) | set(selection.rivals):
+        swapped = set(other) - rest
+        if len(other) == len(hypothesis) and rest <= set(other) and swapped != {effect}:
+            found |= swapped
+    return tuple(sorted(found))
+
+
+def values(search: Search, hypothesis: Hypothesis, effect: str) -> dict[str, Value]:
+    """Parameters of one effect with 95 % intervals.
+
+    The model's own imperfection may add to an effect or hide some of it: as much, in one sigma, as
+    the spike of the prior allows.
+    """
+    problem, candidate = search.problem, search.problem.candidates[effect]
+    point, found = search.points[hypothesis], {}
+    z, covariance = within_bounds(problem, point), point.score.covariance
+    for key, parameter in candidate.keys().items():
+        i, shape = point.linear.index(key), is_shape(problem, key)  # shapes by their logarithm
+        step = 1.0 if shape else abs(z[i] - parameter.off)
+        reach = 1.96 * float(np.hypot(np.sqrt(covariance[i, i]), SpikeSlabSettings.spike * step))
+        triple = z[i] + reach * np.array([0.0, -1.0, 1.0])
+        if shape:
+            triple = np.exp(np.clip(triple, -50, 50))
+        triple = np.clip(triple, parameter.lower, parameter.upper)
+        name, unit = candidate.reported(parameter)
+        if name != parameter.name:
+            triple = 1.0 / np.maximum(triple, 1e-12)[[0, 2, 1]]
+        value, low, high = triple.tolist()
+        found[name] = Value(value, low, high, unit)
+    return found
+
+
+def rungs(search: Search, best: Hypothesis) -> list[Hypothesis]:
+    """Nothing, then the effects of the best answer as they join, the strongest first; parts that
+    were not refitted are passed over."""
+    order = sorted(best, key=lambda e: -strength(search, e, best))
+    parts = [tuple(sorted(order[: i + 1])) for i in range(len(order))]
+    return [NULL, *(part for part in parts if part in search.points)]
+
+
+def ladder(search: Search, best: Hypothesis, kept: HeldOut | None) -> list[tuple[str, float]]:
+    """Error on unseen data at every rung, by what joins there."""
+    steps, names = rungs(search, best), ["model as it is"]
+    for before, after in pairwise(steps):
+        names.append(" + ".join(e for e in after if e not in before))
+    return [(n, error(search, step, kept)) for n, step in zip(names, steps, strict=True)]
+
+
+def fitted_errors(search: Search, best: Hypothesis) -> tuple[float, ...]:
+    """Error on the fitted logs at every rung of the ladder."""
+    first, *others = (search.points[step].fitted_error for step in rungs(search, best))
+    return (error_as_it_is(search) if search.own else first, *others)
+
+
 # gains that no sensor and no motor has, least and largest: a sensor's is off by ten times its usual
 # error there, a motor's force is known to 10 %
 SENSOR, MOTOR = (-0.2, 0.2), (0.5, 2.0)
 DRIVEN = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}
 PLATE = 3.0  # factor by which no figure of a rig is off: feet for metres are 3.28
 HEAVY = 10.0  # inertia that was forgotten, over the one that is known: gears and rotors have less
+OF_RIG = (
+    "{} would be {:.3g} times what the rig is said to have; the unit of a channel is wrong "
+    "(--map), or the rig's figures in the model"
+)
 
 
 @dataclass(frozen=True)
@@ -90,7 +209,7 @@ def caveats_of(
 def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tuple[str, ...]:
     """What to say of effects, and of figures of a rig, that are farther off than any is: a channel
     has another unit. By the `joint` fit, where there is one."""
-    problem, said = search.problem, dict[str, None]()
+    problem, said = search.problem, list[str]()
     model: Model | None = getattr(problem, "model", None)
     for effect in found:
         kind, _, channel = effect.partition(":")
@@ -101,37 +220,25 @@ def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tu
         if kind in ("sensor_scale", *DRIVEN) and not limits[0] <= gain <= limits[1]:
             whose = "motor" if kind in DRIVEN else "sensor"
             off = f"the gain of {channel} would be off by more than any {whose}'s is"
-            said[f"{off}; its unit is wrong, or its scale or offset in a map (--map)"] = None
-        if kind == "extra_inertia" and model is not None:
+            said.append(f"{off}; its unit is wrong, or its scale or offset in a map (--map)")
+        if model is None:
+            continue
+        if kind == "extra_inertia":
             axis = model.effect("drive_axis")
             assert isinstance(axis, DriveAxis)
             times = abs(told["J"].value) / axis.inertia
-            said |= dict.fromkeys(_of_rig(kind, times, times < HEAVY))
-        if (
-            model
-            and model.mechanism.rig == "cylinder"
-            and any("m" in v.unit for v in told.values())
-        ):
+            said += [OF_RIG.format(kind, times)] if times >= HEAVY else []
+        if model.mechanism.rig == "cylinder" and any("m" in v.unit for v in told.values()):
             at = problem.operating_point()
             if doubted := unit_in_doubt(at.x, at.stroke):
-                said[f"{doubted}; if it did not, `stroke` of the model may be what it moves"] = None
-    for figure, value in (joint.figures if joint else {}).items():
+                said.append(f"{doubted}; if it did not, `stroke` of the model may be what it moves")
+    for figure, value in joint.figures.items() if joint and model else ():
         if joint and model and figure in RIG_FIGURES:
             given = given_figure(model, *figure.rsplit(".", 1))
-            low, high = (
-                ends[joint.names.index(figure)] / given for ends in (joint.low, joint.high)
-            )
-            said |= dict.fromkeys(
-                _of_rig(figure, value / given, low < PLATE and high > 1.0 / PLATE)
-            )
-    return tuple(said)
-
-
-def _of_rig(name: str, times: float, right: bool) -> list[str]:
-    """That a figure is so many times the one given, unless that is `right`."""
-    units = "the unit of a channel is wrong (--map), or the rig's figures in the model"
-    said = f"{name} would be {times:.3g} times what the rig is said to have; {units}"
-    return [] if right else [said]
+            i = joint.names.index(figure)
+            if joint.low[i] / given >= PLATE or joint.high[i] / given <= 1.0 / PLATE:
+                said.append(OF_RIG.format(figure, value / given))
+    return tuple(dict.fromkeys(said))
 
 
 def verdict_on(best: Hypothesis, formula: Formula | None, caveats: Caveats) -> Verdict:
@@ -161,12 +268,12 @@ def _structured(search: Search, hypothesis: Hypothesis) -> tuple[float, float]:
     left_over = search.problem.leftover(search.points[hypothesis].fit.theta)
     if left_over is None:
         return 1.0, 0.0
-    r = np.clip(left_over.residual, -CLIP, CLIP)
-    columns = left_over.features
+    residual, columns, runs = left_over
+    r = np.clip(residual, -CLIP, CLIP)
     columns = columns / np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-9)
     folds = np.zeros(len(r), dtype=int)  # blocks of time of each run, dealt out in turn
-    for run in np.unique(left_over.run):
-        own = np.flatnonzero(left_over.run == run)
+    for run in np.unique(runs):
+        own = np.flatnonzero(runs == run)
         folds[own] = np.arange(len(own)) * 2 * FOLDS // len(own) % FOLDS
     power = float(np.mean(r**2))
     left = min(float(np.mean((r - _predicted_folds(r, columns, folds, k)) ** 2)) for k in RIDGES)
@@ -226,12 +333,12 @@ def pattern_left(search: Search, best: Hypothesis) -> str:
     point = search.points[best]
     if not best or point.fitted_error < BinSettings.tolerated:
         return ""
-    settings, problem = ForceProfileSettings, search.problem
+    problem = search.problem
     found = force_profiles(problem, problem.residual(point.fit.theta))
-    plain = [force for force in found if force.largest > settings.negligible * force.usual]
+    plain = [force for force in found if force.largest > NEGLIGIBLE * force.usual]
     first = max(plain, key=lambda force: force.gain, default=None)
     gained = point.log_evidence - search.points[NULL].log_evidence
-    least = max(settings.plain, LEFT * gained)
+    least = max(PLAIN, LEFT * gained)
     if first is None or first.gain < least * point.fitted_error**2:
         return ""
     return str(first)

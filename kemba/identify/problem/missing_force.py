@@ -4,12 +4,13 @@ A missing force is a first-order lag of white noise whose strength is learnt fro
 noise make a tridiagonal system, which is fast for long logs.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky_banded, solveh_banded
 
+from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.events import runs
 from kemba.identify.problem.problem import Array, MissingForce
 
@@ -104,25 +105,31 @@ def spans(time: Array, flags: Array) -> tuple[tuple[float, float], ...]:
 RANGES = (0.003, 0.005, 0.008, 0.013, 0.02)  # reach of a force at an end of the stroke [m]
 
 
-def end_terms(x: Array, stroke: float) -> Iterator[tuple[str, Array]]:
-    """(formula, force per unit coefficient (...)) of forces near the ends of the stroke.
-
-    `x` (...) [m]: position of the piston; `stroke` [m].
-    """
+def rod_terms(
+    x: Array, v: Array, stroke: float, creeps: Iterable[float]
+) -> Iterator[tuple[str, Array]]:
+    """(formula, force on a rod per unit coefficient (n, ...)) of its extension x (n, ...) [m] and
+    rate v [m.s-1]; `stroke` [m]; `creeps` [m]: travels over which a hysteresis turns round."""
+    sign = np.tanh(v / V_COULOMB)
     for d in RANGES:
         yield f"exp(-(x/{d:g})**2)", np.exp(-((x / d) ** 2))
         yield f"exp(-(({stroke:g} - x)/{d:g})**2)", np.exp(-(((stroke - x) / d) ** 2))
+    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
+    yield "max(v, 0)", np.maximum(v, 0.0)
+    yield "v**3", v**3
+    yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
+    yield f"tanh(v/{V_COULOMB:g})*x", sign * x
+    for travel in creeps:
+        yield f"dahl(x, {travel:g})", dahl(x, travel)
 
 
 def dahl(x: Array, travel: float) -> Array:
-    """Hysteresis (n,): z' = (v - abs(v) z)/travel along the path x (n,) [m].
+    """Hysteresis (n, ...): z' = (v - abs(v) z)/travel along paths x (n, ...) [m].
 
     Dahl's model of friction: the force changes its sign over a `travel` [m].
     """
-    z, out = 0.0, np.empty(len(x))
-    out[0] = z
-    for i, step in enumerate(np.diff(x), start=1):
-        target = 1.0 if step > 0 else -1.0
-        z = target + (z - target) * np.exp(-abs(step) / travel)
-        out[i] = z
+    out = np.zeros(x.shape)
+    for i, step in enumerate(np.diff(x, axis=0), start=1):
+        target = np.where(step > 0, 1.0, -1.0)
+        out[i] = target + (out[i - 1] - target) * np.exp(-np.abs(step) / travel)
     return out

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -75,6 +75,10 @@ class Candidate:
     def key(self) -> str:
         """Name of the switch in theta: `seal_friction.F_c`."""
         return f"{self.effect}.{self.lead.name}"
+
+    def is_on(self, theta: Theta) -> bool:
+        """Whether theta switches the effect on."""
+        return theta.get(self.key, self.lead.off) != self.lead.off
 
     def reported(self, parameter: Parameter) -> tuple[str, str]:
         """Name and unit of a parameter as the catalogue has it."""
@@ -181,19 +185,6 @@ class MissingForce:
         return np.asarray(np.mean((self.force / self.sigma) ** 2, axis=0))
 
 
-@dataclass(frozen=True)
-class Leftover:
-    """What a fit leaves over, and what it may depend on.
-
-    `residual` (n,): in units of the noise, not whitened. `features` (n, m): quantities that a
-    missing force could be a function of. `run` (n,): index of each row's run.
-    """
-
-    residual: Array
-    features: Array
-    run: Labels
-
-
 NUISANCE = 0.5  # step of a nominal figure, in prior sigmas
 PARAMETER = 0.05  # step of a parameter that is on, as a share of its size or value
 ABSURD = 1e5  # residual in sigmas at which nothing can be predicted: beyond data
@@ -204,14 +195,13 @@ def bounded(residual: Array, absurd: float) -> Array:
     return np.asarray(np.clip(np.nan_to_num(residual, nan=absurd), -absurd, absurd))
 
 
-def mean_slope(base: Array, there: Sequence[Array], steps: Sequence[float]) -> Array:
-    """Mean slope (n,) of residuals `base` (n,) over finite `steps` that lead to the residuals
-    `there`; zero where every step leads to where nothing can be predicted: a rod that is driven
+def mean_slope(base: Array, steps: Sequence[tuple[Array, float]]) -> Array:
+    """Mean slope (n,) of residuals `base` (n,) over finite steps: the residuals there and how far
+    each goes. Zero where every step leads to where nothing can be predicted: a rod that is driven
     through its cylinder's end leaves no volume to the air."""
-    known = [i for i, r in enumerate(there) if np.all(np.abs(r) < ABSURD)]
-    if not known:
-        return np.zeros_like(base)
-    return np.asarray(np.mean([(there[i] - base) / steps[i] for i in known], axis=0))
+    most = max(ABSURD, 10.0 * float(np.max(np.abs(base), initial=0.0)))
+    known = [(there - base) / h for there, h in steps if np.all(np.abs(there) < most)]
+    return np.asarray(np.mean(known, axis=0)) if known else np.zeros_like(base)
 
 
 class Problem(ABC):
@@ -245,10 +235,14 @@ class Problem(ABC):
     def residual(self, theta: Theta) -> Array:
         """Whitened residuals (n,) of all runs."""
 
-    def residuals(self, thetas: Sequence[Theta]) -> Array:
-        """Whitened residuals (n, c) of all runs at each of c thetas; quicker where a problem can
+    def each_residual(self, thetas: Sequence[Theta]) -> Iterator[Array]:
+        """Whitened residuals (n,) of all runs at each theta in turn; quicker where a problem can
         share work between them."""
-        return np.stack([self.residual(theta) for theta in thetas], axis=1)
+        return map(self.residual, thetas)
+
+    def residuals(self, thetas: Sequence[Theta]) -> Array:
+        """The same (n, c) of c thetas at once."""
+        return np.stack(list(self.each_residual(thetas)), axis=1)
 
     @abstractmethod
     def rows(self) -> Rows:
@@ -263,13 +257,11 @@ class Problem(ABC):
         default takes finite differences with steps of physical size for all parameters; a column is
         zero where every step leads to no prediction at all.
         """
-        base = self.residual(theta)
-        columns = []
-        for name in names:
-            steps = list(self.steps(theta, name))
-            slopes = [(self.residual({**theta, **step}) - base) / h for step, h in steps]
-            known = [slope for slope in slopes if np.isfinite(slope).all()]
-            columns.append(np.mean(known, axis=0) if known else np.zeros_like(base))
+        steps = [list(self.steps(theta, name)) for name in names]
+        moved = [{**theta, **step} for group in steps for step, _ in group]
+        there = self.each_residual([theta, *moved])
+        base = next(there)
+        columns = [mean_slope(base, [(next(there), h) for _, h in group]) for group in steps]
         return np.stack(columns, axis=1) if columns else np.empty((len(base), 0))
 
     def steps(self, theta: Theta, name: str) -> Iterable[tuple[dict[str, float], float]]:
@@ -283,7 +275,7 @@ class Problem(ABC):
             return
         candidate = self.candidates[name.rsplit(".", 1)[0]]
         parameter = candidate.keys()[name]
-        if name == candidate.key and theta.get(name, parameter.off) == parameter.off:
+        if name == candidate.key and not candidate.is_on(theta):
             shapes = {k: theta.get(k, p.typical) for k, p in candidate.keys().items() if k != name}
             h = self._secant_step(parameter)
             for sign in (1.0, -1.0) if parameter.signed else (1.0,):
@@ -445,8 +437,10 @@ class Problem(ABC):
         practice. Default: infinite, so that every formula counts."""
         return math.inf
 
-    def leftover(self, theta: Theta) -> Leftover | None:
-        """What the model at theta leaves over, with what it may depend on; None: not known."""
+    def leftover(self, theta: Theta) -> tuple[Array, Array, Labels] | None:
+        """What the model at theta leaves over, in units of the noise and not whitened (n,), what a
+        missing force could be a function of (n, m), and the run of each row (n,). None: not known.
+        """
         return None
 
     # Gate

@@ -69,17 +69,14 @@ class SensorFaults:
                 fault = cls.model_validate({"channel": channel})
             if fault is not None:
                 found.append(fault.model_copy(update=values))
-        brought = (f for effect in self._carrying(theta) for f in effect.readings())
-        return [*found, *(fault for fault in brought if fault.channel == channel)]
-
-    def _carrying(self, theta: Theta) -> list[Effect]:
-        """The effects at theta that bring faults of sensors along."""
-        found = dict(self.carried)
-        for kind, cls in self._carriers.items():
-            own = {f: theta[f"{kind}.{f}"] for f in cls.declared() if f"{kind}.{f}" in theta}
+        carrying = dict(self.carried)  # effects that bring faults of sensors along
+        for kind, effect in self._carriers.items():
+            own = {f: theta[f"{kind}.{f}"] for f in effect.declared() if f"{kind}.{f}" in theta}
             if own:
-                found[kind] = found.get(kind, cls.model_validate({"kind": kind})).bind(own)
-        return list(found.values())
+                plain = carrying.get(kind) or effect.model_validate({"kind": kind})
+                carrying[kind] = plain.bind(own)
+        brought = (f for effect in carrying.values() for f in effect.readings())
+        return [*found, *(fault for fault in brought if fault.channel == channel)]
 
     def shown(self, theta: Theta, channel: str, true: Series) -> Series:
         """The channel as its sensor shows it at theta, from its true values."""

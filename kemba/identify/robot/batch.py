@@ -19,11 +19,10 @@ from kemba.effects.pneumatics.switching import Pulse, pulses
 from kemba.effects.sensors import CHANNELS, SensorEffect, as_measured
 from kemba.effects.series import Series
 from kemba.identify.logs.reading import held
-from kemba.identify.problem.noise import WhiteNoiseSettings, difference_sigma
+from kemba.identify.problem.noise import FEWEST_VALUES, difference_sigma
 from kemba.identify.problem.problem import Array, Flags
 from kemba.trajectory import Trajectory
 
-SHORTEST = 0.7e-3  # denser rows are averaged [s]
 LONGEST = 1.6e-3  # nodes farther apart are filled [s]
 # smallest noise of a channel, in m or rad: far below what position sensors resolve
 FINEST = 1e-6
@@ -73,30 +72,15 @@ def resample(
     sigma = np.array([_sigma(c, y) if k is None else float(k) for c, k, y in values])
     memory = np.array([times.get(c, np.nan) for c in channels])
     stated = np.array([k is not None for k in known])
-    time, raw, torque, count = _thin(time, raw, torque)
     time, raw, torque = _fill(time, raw, torque)
-    less = np.where(np.isfinite(memory), 1.0, np.sqrt(count))  # the mean of white noise is smaller
-    return ResampledLog(name, time, raw, torque, sent, sigma / less, memory, stated)
+    return ResampledLog(name, time, raw, torque, sent, sigma, memory, stated)
 
 
 def _sigma(channel: str, values: Array) -> float:
     """Noise of one sample as its values tell, else the usual one."""
-    if np.isfinite(values).sum() < WhiteNoiseSettings.fewest:
+    if np.isfinite(values).sum() < FEWEST_VALUES:
         return CHANNELS[channel.split("/")[-1]][1]
     return max(difference_sigma(values), FINEST)
-
-
-def _thin(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array, int]:
-    """Averages of so many rows that nodes are at least `shortest` apart."""
-    count = max(1, int(np.floor(1e-3 / max(np.median(np.diff(time)), 1e-9) + 0.3)))
-    if np.median(np.diff(time)) >= SHORTEST or count == 1:
-        return time, raw, torque, 1
-    n = len(time) // count * count
-    with np.errstate(invalid="ignore"):
-        parts = [a[:n].reshape(n // count, count, -1).mean(axis=1) for a in (time[:, None], raw)]
-    held = torque[:n].reshape(n // count, count, -1).mean(axis=1)
-    # a command sent during the mean acts half a bin later than the bin's centre
-    return parts[0][:, 0], parts[1], 0.5 * (held + np.roll(held, -1, axis=0)), count
 
 
 def _fill(time: Array, raw: Array, torque: Array) -> tuple[Array, Array, Array]:

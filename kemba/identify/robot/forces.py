@@ -6,17 +6,16 @@ strength is learnt from the data; a channel that needs no force ends with almost
 the contact forces are unknown too, so only the force that they cannot explain is found.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
-from kemba.effects.mechanics.piston import V_COULOMB
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.effects.pneumatics.switching import changes as switchings
 from kemba.identify.compare.force_profiles import lags, risen
-from kemba.identify.problem.missing_force import dahl, end_terms, spans
+from kemba.identify.problem.missing_force import rod_terms, spans
 from kemba.identify.problem.problem import (
     Array,
     Changes,
@@ -31,9 +30,8 @@ from kemba.identify.problem.problem import (
 )
 from kemba.identify.robot.batch import ResampledLog
 from kemba.identify.robot.filter import System, gains, smooth_with_band
-from kemba.identify.robot.linear import scatter
+from kemba.identify.robot.linear import GROUND, QUIET, densities, scatter
 from kemba.identify.robot.physics import Physics
-from kemba.identify.robot.reference import QUIET, PlaceSettings, densities
 from kemba.identify.robot.state import LinearisedState
 
 MODES = np.array(["00", "01", "10", "11"], dtype=object)  # extend, retract
@@ -52,7 +50,7 @@ def describe(state: LinearisedState) -> Rows:
     phase = np.full(shape[:2], "", dtype=object)
     for i, schedule in enumerate(state.schedules):
         phase[: len(schedule.phase), i] = schedule.phase
-    sigma = np.full(shape[1:], PlaceSettings.ground)
+    sigma = np.full(shape[1:], GROUND)
     sigma[:, : batch.sigma.shape[1]] = batch.sigma
     whole = {
         "run": np.arange(shape[1])[:, None],
@@ -147,23 +145,6 @@ RIPPLES = (6, 8, 10, 12, 14, 16, 18, 20, 24)  # ripples of a motor per turn of t
 ROPES = (0.26, 0.28, 0.30, 0.32, 0.35)  # heights from which a cable pulls [m]
 
 
-def _rod_terms(x: Array, v: Array, stroke: float) -> Iterator[tuple[str, Array]]:
-    """(formula, force on the rod (n, L, legs)) of extension and its rate; `stroke` [m]."""
-    sign = np.tanh(v / V_COULOMB)
-    yield from end_terms(x, stroke)
-    yield f"{stroke / 2:g} - x", stroke / 2 - x
-    yield f"(x - {stroke / 2:g})**3", (x - stroke / 2) ** 3
-    yield "max(v, 0)", np.maximum(v, 0.0)
-    yield "min(v, 0)", np.minimum(v, 0.0)
-    yield "v**3", v**3
-    yield f"max(tanh(v/{V_COULOMB:g}), 0)", np.maximum(sign, 0.0)
-    yield f"tanh(v/{V_COULOMB:g})*x", sign * x
-    for travel in CREEPS:
-        paths = x.reshape(len(x), -1).T
-        turned = np.stack([dahl(path, travel) for path in paths], axis=1)
-        yield f"dahl(x, {travel:g})", turned.reshape(x.shape)
-
-
 def _hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]:
     """(formula, torque at the hip (n, L, legs)) of angle, rate and the torque commanded."""
     sign = np.tanh(w / SPEED)
@@ -175,15 +156,8 @@ def _hip_terms(q: Array, w: Array, torque: Array) -> Iterator[tuple[str, Array]]
     yield "max(w, 0)", np.maximum(w, 0.0)
 
 
-def _body_terms(name: str, at: Array, v: Array) -> Iterator[tuple[str, Array]]:
-    """(formula, force on the body (n, L, 1)) along one axis."""
-    yield from _drag_terms(name, v)
-    for height in ROPES:
-        yield f"max({name} - {height:g}, 0)", np.maximum(at - height, 0.0)
-
-
 def _drag_terms(name: str, v: Array) -> Iterator[tuple[str, Array]]:
-    """(formula, force on the body (n, L, 1)) of its velocity alone."""
+    """(formula, force on the body (n, L, 1)) of its velocity along one axis."""
     yield f"v{name}*abs(v{name})", v * np.abs(v)
     yield f"v{name}**3", v**3
 
@@ -309,10 +283,15 @@ class RobotForces(Problem):
         state, y, rate = self.state, self.state.motion.y, self.state.motion.rate
         legs, stroke = len(state.physics.legs), state.physics.mechanism.stroke
         hips, rods = range(3, 3 + legs), range(3 + legs, 3 + 2 * legs)
-        groups = (
-            (rods, "rods", _rod_terms(y[..., rods], rate[..., rods], stroke)),
+        x, v, z = y[..., rods], rate[..., rods], y[..., [1]]
+        own = [(f"{stroke / 2:g} - x", stroke / 2 - x), ("min(v, 0)", np.minimum(v, 0.0))]
+        ropes = [(f"max(z - {h:g}, 0)", np.maximum(z - h, 0.0)) for h in ROPES]
+        groups: tuple[tuple[Sequence[int], str, Iterable[tuple[str, Array]]], ...] = (
+            (rods, "rods", rod_terms(x, v, stroke, CREEPS)),
+            (rods, "rods", own),
             (hips, "hips", _hip_terms(y[..., hips], rate[..., hips], state.batch.torque)),
-            ([1], "body z", _body_terms("z", y[..., [1]], rate[..., [1]])),
+            ([1], "body z", _drag_terms("z", rate[..., [1]])),
+            ([1], "body z", ropes),
             ([0], "body x", _drag_terms("x", rate[..., [0]])),
         )
         found: dict[str, Array] = {}

@@ -19,8 +19,8 @@ from kemba.identify.problem.problem import Array, Candidate, Flags
 from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
+from kemba.identify.robot.linear import Reference
 from kemba.identify.robot.physics import Physics, SampleMap
-from kemba.identify.robot.reference import Reference
 from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
 

@@ -13,7 +13,7 @@ from kemba.identify.problem.candidates import (
     nominal_figures,
     without_delay,
 )
-from kemba.identify.problem.problem import Array, Flags, Theta
+from kemba.identify.problem.problem import Array, Theta
 from kemba.machine_code import Native
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
@@ -221,18 +221,6 @@ class Physics:
             found.append((place, rates, frame @ ca.jacobian(foot, node.q)))
         places, rates, slopes = (ca.vertcat(*parts) for parts in zip(*found, strict=True))
         return places, rates, slopes
-
-    @cached_property
-    def straight(self) -> tuple[Flags, Flags]:
-        """Parameters (k,) in which the force at given effect states is linear, and pairs (k, k)
-        of parameters that multiply each other."""
-        slopes = ca.jacobian(self._force, self.p)
-        rows, _, count = *slopes.shape, self.p.numel()
-        second = ca.jacobian_sparsity(ca.vec(ca.densify(slopes)), self.p)
-        bends = np.zeros((count, count), bool)
-        for row, column in zip(*second.get_triplet(), strict=True):
-            bends[row // rows, column] = True
-        return ~(np.diag(bends) | self.moves), bends
 
     def states_at(self, p: Array) -> Index:
         """Effect states that forces at p (k,) depend on."""

@@ -1,6 +1,6 @@
 """Robot logs under one model as whitened residuals: the innovations of a filter around the data."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 
 import numpy as np
@@ -9,34 +9,32 @@ from typing_extensions import Self
 from kemba.identify.infer.windows import rms
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
+    FIGURES,
+    FREE_THEN,
+    ORIFICE,
     extended,
+    free_figures,
     ground_of,
     in_the_air,
     robot_candidates,
     sensor_candidates,
-)
-from kemba.identify.problem.problem import Array, Candidate, Problem, Theta, mean_slope
-from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
-from kemba.identify.problem.structure import (
-    FIGURES,
-    FREE_THEN,
-    ORIFICE,
-    free_figures,
     with_orifices,
 )
+from kemba.identify.problem.problem import Array, Candidate, Problem, Theta
+from kemba.identify.problem.sensor_faults import SensorFaults, is_straight, moves_readings
 from kemba.identify.robot.batch import Batch, ResampledLog, resample
-from kemba.identify.robot.forces import RobotForces, describe
-from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
-from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
-from kemba.identify.robot.noise import (
+from kemba.identify.robot.filter import (
     Noise,
     expected_power,
     predicted_error,
     stated_noise,
     with_drifts,
 )
+from kemba.identify.robot.forces import RobotForces, describe
+from kemba.identify.robot.geometry import StandingLengths, remarks, standing_lengths
+from kemba.identify.robot.linear import ForceDensity, first_reference
+from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.physics import Physics
-from kemba.identify.robot.reference import ForceDensity, first_reference
 from kemba.identify.robot.state import learnt_from, linearise_at
 from kemba.identify.robot.validate import contradictions, mixed_commands, slightly_mixed_up
 from kemba.model.model import Model
@@ -175,28 +173,22 @@ class RobotProblem(RobotForces):
         """Whitened (predicted - measured) (n,), rows as `rows` describes them."""
         return self.state.pick(self.state.residuals([theta]))[:, 0]
 
-    def residuals(self, thetas: Sequence[Theta]) -> Array:
-        """The same (n, c) at each theta; the filter takes them side by side."""
-        return np.stack(list(self.state.each_residual(thetas)), axis=1)
+    def each_residual(self, thetas: Sequence[Theta]) -> Iterator[Array]:
+        """The same (n,) at each theta in turn; the filter takes them side by side."""
+        return self.state.each_residual(thetas)
 
     def jacobian(self, theta: Theta, names: Iterable[str]) -> Array:
         """Derivatives (n, k) where the force is linear in the parameter, else secants."""
-        names = list(names)
-        if not names:
-            return np.empty((len(self.residual(theta)), 0))
+        if not (names := list(names)):
+            return super().jacobian(theta, names)
+        direct = [n for n in names if self._is_direct(n)]
+        others = [n for n in names if n not in direct]
         # the shapes of absent effects have their typical value
         typical = {k: v.typical for k, v in self.parameters().items() if np.isfinite(v.typical)}
-        direct = [n for n in names if self._is_direct(n)]
         found = self.state.slopes({**typical, **theta}, direct)
         columns = dict(zip(direct, found, strict=True))
-        steps = {n: list(self.steps(theta, n)) for n in names if n not in columns}
-        if steps:
-            moved = [{**theta, **step} for group in steps.values() for step, _ in group]
-            there = self.state.each_residual([theta, *moved])
-            base = next(there)
-            for name, group in steps.items():
-                ends = [next(there) for _ in group]
-                columns[name] = mean_slope(base, ends, [h for _, h in group])
+        if others:
+            columns |= dict(zip(others, super().jacobian(theta, others).T, strict=True))
         return np.stack([columns[n] for n in names], axis=-1)
 
     def _is_direct(self, name: str) -> bool:

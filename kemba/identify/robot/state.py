@@ -12,29 +12,36 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from kemba.effects.pneumatics.switching import delayed, instants, is_on
 from kemba.identify.problem.candidates import GRIP, SOFTNESS
+from kemba.identify.problem.noise import ChannelNoise
 from kemba.identify.problem.problem import Array, Flags, Theta
 from kemba.identify.problem.sensor_faults import SensorFaults, is_fault
-from kemba.identify.problem.sensor_noise import ChannelNoise
 from kemba.identify.robot.batch import Batch, ResampledLog, ahead, sensed, whole_rows
 from kemba.identify.robot.contact import ContactSchedule, loaded
-from kemba.identify.robot.filter import FilterGains, at_once, gains, innovations
-from kemba.identify.robot.linear import LinearisedMotion, linearise_along, smoothed
-from kemba.identify.robot.noise import Noise, SensorNoiseSettings, learnt_noise, stated_noise
-from kemba.identify.robot.physics import Index, Physics
-from kemba.identify.robot.reference import (
+from kemba.identify.robot.filter import (
+    FilterGains,
+    Noise,
+    at_once,
+    gains,
+    innovations,
+    noise_behind,
+)
+from kemba.identify.robot.linear import (
     LOOSE,
     ForceDensity,
+    LinearisedMotion,
     Reference,
     densities,
     first_reference,
+    linearise_along,
     read_schedules,
+    smoothed,
 )
+from kemba.identify.robot.physics import Index, Physics
 
 
 def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
@@ -58,50 +65,33 @@ def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
     return times, valves, index[: len(log.time)]
 
 
-@dataclass(frozen=True)
-class Inputs:
-    """One run cut at every switching.
-
-    `h` (N,) [s]: steps of the integration; `given`: q, v and inputs (N, .) over them; `index` (n,)
-    of each node among them; `width` (n,) [s] of each node's step.
-    """
-
-    h: Array
-    given: tuple[Array, Array, Array]
-    index: Index
-    width: Array
-
-    def means(self, values: Array) -> Array:
-        """(n, k): values (N, k) averaged over the step from each node."""
-        padded = np.append(values * self.h[:, None], 0 * values[:1], axis=0)
-        sums = np.add.reduceat(padded, self.index, axis=0)
-        return np.vstack([(sums / self.width[:, None])[:-1], values[-1:]])
-
-
-def read_inputs(physics: Physics, batch: Batch, ref: Reference, delays: Array) -> list[Inputs]:
-    """Per run; `delays` (valves, 2) in seconds to switching on and off."""
-    found = []
+def air_states(
+    physics: Physics,
+    batch: Batch,
+    ref: Reference,
+    delays: Array,
+    p: Array,
+    among: Index | None = None,
+) -> tuple[Array, Array]:
+    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `delays`
+    (valves, 2) in seconds to switching on and off; `among`: states that are asked for (None:
+    all)."""
+    found: tuple[list[Array], list[Array]] = [], []
     for i, log in enumerate(batch.resampled):
         n = len(log.time)
-        times, valves, index = substeps(log, delays)
+        times, valves, index = substeps(log, delays)  # the run cut at every switching
         h = np.diff(times)
         middle = 0.5 * (times[1:] + times[:-1])
         q, v = (_at(log.time, a[:n, i], middle) for a in (ref.q, ref.v))
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves).T
-        width = np.append(np.diff(log.time), 1.0)
-        found.append(Inputs(h, (q, v, u), index, width))
-    return found
-
-
-def air_states(
-    physics: Physics, batch: Batch, inputs: Sequence[Inputs], p: Array, among: Index | None = None
-) -> tuple[Array, Array]:
-    """Effect states (n, L, ns) and inputs (n, L, nu), both the mean over each step; `among`: states
-    that are asked for (None: all)."""
-    moving = p[physics.moves]
-    states = [d.means(physics.states.run(d.h, *d.given, moving, among)) for d in inputs]
-    return batch.pad(states, 0.0), batch.pad([d.means(d.given[2]) for d in inputs], 0.0)
+        width = np.append(np.diff(log.time), 1.0)[:, None]
+        states = physics.states.run(h, q, v, u, p[physics.moves], among)
+        for store, values in zip(found, (states, u), strict=True):
+            padded = np.append(values * h[:, None], 0 * values[:1], axis=0)
+            sums = np.add.reduceat(padded, index, axis=0)
+            store.append(np.vstack([(sums / width)[:-1], values[-1:]]))
+    return batch.pad(found[0], 0.0), batch.pad(found[1], 0.0)
 
 
 def _at(time: Array, values: Array, times: Array) -> Array:
@@ -111,83 +101,7 @@ def _at(time: Array, values: Array, times: Array) -> Array:
     return np.asarray(values[right - 1] + share * (values[right] - values[right - 1]))
 
 
-KEPT = 4  # inputs and states that are kept beside the first ones
-LINES = 50_000_000  # bytes of forces that are kept: the next Jacobian asks for them
-
-
-@dataclass
-class ForceLine:
-    """Force (N, k) at p, and its slopes (N, k) along parameters in which it is linear."""
-
-    p: Array
-    force: Array
-    slopes: dict[int, Array] = field(default_factory=dict)
-
-
-class Forces:
-    """Force that a motion needs beyond the model, at any parameters p (k,) and delays (valves, 2)
-    [s]."""
-
-    def __init__(self, physics: Physics, batch: Batch, motion: LinearisedMotion) -> None:
-        self.physics, self.batch, self.motion = physics, batch, motion
-        self._inputs: dict[bytes, list[Inputs]] = {}
-        self._states: dict[bytes, tuple[Array, Array]] = {}
-        self._lines: dict[bytes, ForceLine] = {}
-
-    def at(self, p: Array, delays: Array) -> Array:
-        """Force (n, L, k) that the motion needs beyond model and contact."""
-        return self.batch.deep(self._force(p, delays)) - self.motion.contact
-
-    def slopes(self, p: Array, delays: Array) -> Array:
-        """d force / dp (N, k, len(p)) at the samples."""
-        given = (*self.motion.middle, *self.states(p, delays, None))
-        return self.physics.call("by_parameter", *given, p=p)[0]
-
-    def states(self, p: Array, delays: Array, among: Index | None) -> tuple[Array, Array]:
-        """Effect states (N, ns) and inputs (N, nu) at the samples; `among`: states that are asked
-        for (None: all)."""
-        wanted = b"" if among is None else among.tobytes()
-        key = delays.tobytes() + p[self.physics.moves].tobytes() + wanted
-        if key not in self._states:
-            given = self._inputs.get(delays.tobytes())
-            if given is None:
-                given = read_inputs(self.physics, self.batch, self.motion.ref, delays)
-                _keep(self._inputs, delays.tobytes(), given, KEPT)
-            states, inputs = air_states(self.physics, self.batch, given, p, among)
-            _keep(self._states, key, (self.batch.flat(states), self.batch.flat(inputs)), KEPT)
-        return self._states[key]
-
-    def _force(self, p: Array, delays: Array) -> Array:
-        straight, crossed = self.physics.straight
-        key = delays.tobytes() + p[~straight].tobytes()
-        line = self._lines.get(key)
-        if line is None:
-            line = ForceLine(p.copy(), self._exact(p, delays))
-            _keep(self._lines, key, line, max(KEPT, LINES // line.force.nbytes))
-        moved = np.flatnonzero(p != line.p)
-        if crossed[np.ix_(moved, moved)].any():
-            return self._exact(p, delays)
-        force = line.force
-        for i in moved.tolist():
-            if i not in line.slopes:
-                one = line.p.copy()
-                one[i] += 1.0
-                line.slopes[i] = self._exact(one, delays) - line.force
-            force = force + (p[i] - line.p[i]) * line.slopes[i]
-        return force
-
-    def _exact(self, p: Array, delays: Array) -> Array:
-        states = self.states(p, delays, self.physics.states_at(p))
-        return self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
-
-
-def _keep(store: dict[bytes, Any], key: bytes, value: Any, most: int) -> None:
-    """Add to a store that holds the first one and the last ones, `most` of them."""
-    if len(store) > most:
-        del store[list(store)[1]]
-    store[key] = value
-
-
+KEPT = 4  # states that are kept beside the first ones
 ROUNDS = 2  # times that the motion is smoothed with the model
 LEAD_IN = 4  # nodes at the start that only tell where a run begins
 
@@ -201,10 +115,9 @@ class LinearisedState:
 
     `sensors`: what sensors make of the motion. `schedules`: contacts of each run. `motion`: the
     reference, and the model linearised along it. `gain`: gains of the filter. `mask` (n, L, m):
-    rows that are data. `forces`: the model's force along the motion at any parameters. `linear`:
-    name -> generalised force (n, L, k) per unit of a parameter that stands beside the model, and
-    its nominal value. `ground`: parameters of the model's soft ground, empty where it is rigid.
-    `noise` of the sensors, as it is coloured; empty: white.
+    rows that are data. `linear`: name -> generalised force (n, L, k) per unit of a parameter that
+    stands beside the model, and its nominal value. `ground`: parameters of the model's soft ground,
+    empty where it is rigid. `noise` of the sensors, as it is coloured; empty: white.
     """
 
     physics: Physics
@@ -216,11 +129,9 @@ class LinearisedState:
     motion: LinearisedMotion
     gain: FilterGains
     mask: Flags
-    forces: Forces
     noise: Noise = ()
     linear: Mapping[str, tuple[Array, float]] = field(default_factory=dict)
-    # what was `seen` with the lengths asked for last: a column of slopes seldom changes them
-    _last_seen: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
+    _states: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def measurement(self, theta: Theta) -> Array:
         """Measured minus reference (n, L, m) in the channel's unit, the reference as the sensors at
@@ -239,20 +150,31 @@ class LinearisedState:
         p, at, own = self.physics.at(theta), self.physics.at(self.base), self.physics.lengths
         if np.array_equal(p[own], at[own]):
             return self.motion.y, self.motion.places
-        key = p[own].tobytes()
-        if key not in self._last_seen:
-            nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
-            y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
-            stops = y[..., y.shape[2] - len(self.physics.legs) :]
-            self._last_seen.clear()
-            self._last_seen[key] = y, np.concatenate([feet, stops], axis=2)
-        return self._last_seen[key]
+        nodes = (self.batch.flat(a) for a in (self.motion.ref.q, self.motion.ref.v))
+        y, feet = (self.batch.deep(a) for a in self.physics.call("seen", *nodes, p=p))
+        stops = y[..., y.shape[2] - len(self.physics.legs) :]
+        return y, np.concatenate([feet, stops], axis=2)
 
     def acceleration(self, theta: Theta) -> Array:
         """Acceleration (n, L, k) that the model at theta adds to the reference's."""
-        force = self.forces.at(self.physics.at(theta), self.physics.timing(theta))
+        p, delays = self.physics.at(theta), self.physics.timing(theta)
+        states = self.states(p, delays, self.physics.states_at(p))
+        samples = self.physics.call("residual", *self.motion.middle, *states, p=p)[0]
+        force = self.batch.deep(samples) - self.motion.contact
         beside = [theta.get(name, nominal) - nominal for name, (_, nominal) in self.linear.items()]
         return self.motion.defect(force + self._columns @ beside if any(beside) else force)
+
+    def states(self, p: Array, delays: Array, among: Index | None) -> tuple[Array, Array]:
+        """Effect states (N, ns) and inputs (N, nu) at the samples, at parameters p (k,) and delays
+        (valves, 2) [s]; `among`: states that are asked for (None: all)."""
+        wanted = b"" if among is None else among.tobytes()
+        key = delays.tobytes() + p[self.physics.moves].tobytes() + wanted
+        if key not in self._states:
+            if len(self._states) > KEPT:
+                del self._states[list(self._states)[1]]
+            found = air_states(self.physics, self.batch, self.motion.ref, delays, p, among)
+            self._states[key] = self.batch.flat(found[0]), self.batch.flat(found[1])
+        return self._states[key]
 
     @cached_property
     def _columns(self) -> Array:
@@ -263,8 +185,9 @@ class LinearisedState:
         """Whitened column (rows,) of each parameter in turn, in which the force is linear."""
         if not names:
             return
-        physics = self.physics
-        slopes = self.forces.slopes(physics.at(theta), physics.timing(theta))
+        physics, p = self.physics, self.physics.at(theta)
+        given = (*self.motion.middle, *self.states(p, physics.timing(theta), None))
+        slopes = physics.call("by_parameter", *given, p=p)[0]
         place = {n: i for i, n in enumerate(physics.names)}
         for part in at_once(len(names)):
             forces = (
@@ -296,8 +219,7 @@ class LinearisedState:
 
     def commanded(self, batch: Batch) -> Array:
         """Whitened residual (rows,) at the base if the commands had been those of `batch`."""
-        forces = Forces(self.physics, batch, self.motion)
-        found = replace(self, batch=batch, forces=forces).residuals([self.base])
+        found = replace(self, batch=batch, _states={}).residuals([self.base])
         return self.pick(found)[:, 0]
 
     def with_noise(self, noise: Noise) -> LinearisedState:
@@ -350,8 +272,20 @@ def linearise_at(
     on_time = (ahead(a, rate, batch.resampled, late - rows * dt) for a, rate in rates)
     reference = Reference(*on_time)  # as sensors that are not late would have seen it
     schedules = read_schedules(physics, batch, reference, p)
+
+    def along(unknown: ForceDensity) -> LinearisedState:
+        """The model at `base` linearised along the reference as it is now."""
+        delays = physics.timing(base)
+        states = air_states(physics, batch, reference, delays, p)
+        density = densities(physics, batch, schedules, unknown)
+        motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
+        mask = np.isfinite(motion.system.R)
+        mask[:LEAD_IN] = False
+        made = (schedules, motion, gains(motion.system), mask, noise)
+        return LinearisedState(physics, batch, sensors, dict(base), ground, *made)
+
     for _ in range(ROUNDS):
-        state = _along(physics, batch, sensors, base, ground, schedules, reference, LOOSE, noise)
+        state = along(LOOSE)
         y, g = state.measurement(base), state.acceleration(base)
         reference = smoothed(state.motion, state.gain, y, g)
         if sensors.present or any(map(is_fault, base)):  # as true sensors would have seen it
@@ -359,54 +293,16 @@ def linearise_at(
         normal = [state.motion.normal[: len(s.phase), i] for i, s in enumerate(schedules)]
         schedules = tuple(loaded(s, f, dt) for s, f in zip(schedules, normal, strict=True))
         del state  # its arrays make room for the next one's
-    state = _along(physics, batch, sensors, base, ground, schedules, reference, unknown, noise)
+    state = along(unknown)
     links = zip(physics.links, np.moveaxis(state.motion.links, -1, 0), strict=True)
     linear = {name: (column, 0.0) for name, column in links}
     return replace(state, linear={**linear, GRIP: (state.motion.less_grip, 1.0)})
 
 
-def _along(
-    physics: Physics,
-    batch: Batch,
-    sensors: SensorFaults,
-    base: Theta,
-    ground: Mapping[str, float],
-    schedules: tuple[ContactSchedule, ...],
-    reference: Reference,
-    unknown: ForceDensity,
-    noise: Noise,
-) -> LinearisedState:
-    """The model at `base` linearised along one reference."""
-    p, delays = physics.at(base), physics.timing(base)
-    states = air_states(physics, batch, read_inputs(physics, batch, reference, delays), p)
-    density = densities(physics, batch, schedules, unknown)
-    motion = linearise_along(physics, batch, schedules, reference, density, states, p, noise)
-    mask = np.isfinite(motion.system.R)
-    mask[:LEAD_IN] = False
-    forces = Forces(physics, batch, motion)
-    gain = gains(motion.system)
-    return LinearisedState(
-        physics, batch, sensors, dict(base), ground, schedules, motion, gain, mask, forces, noise
-    )
-
-
 def learnt_from(state: LinearisedState, left: Array, drifts: bool) -> tuple[ChannelNoise, ...]:
     """The noise of each channel, learnt from the rows `left` (rows,) that a flexible model leaves;
-    as stated where a correlation time is stated. `drifts`: slow drifts are looked for, too."""
-    motion, batch, settings = state.motion, state.batch, SensorNoiseSettings
-    k = motion.ref.q.shape[2]
-    pushed = motion.inverse @ motion.channels[..., :k]
-    most = np.where(batch.stated, settings.stated, settings.guessed)
-    found = learnt_noise(
-        motion.system,
-        state.gain,
-        state.spread(left),
-        batch.sigma,
-        batch.h,
-        [pushed[..., i] for i in range(k)],
-        most,
-        drifts,
-    )
-    stated = stated_noise(batch)
-    known = np.isfinite(batch.memory)
-    return tuple(s if on else f for s, f, on in zip(stated, found, known, strict=True))
+    `drifts`: slow drifts are looked for, too."""
+    motion, k = state.motion, state.motion.ref.q.shape[2]
+    pushes = np.moveaxis(motion.inverse @ motion.channels[..., :k], -1, 0)
+    errors = state.spread(left)
+    return noise_behind(motion.system, state.gain, errors, state.batch, list(pushes), drifts)

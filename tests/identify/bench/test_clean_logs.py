@@ -13,7 +13,7 @@ from twin.measure import Sensors
 from kemba.effects import BY_KIND
 from kemba.errors import KembaError
 from kemba.identify.bench.bench_log import prepare
-from kemba.identify.bench.clocks import ClockSettings, looked_at
+from kemba.identify.bench.clocks import looked_at
 from kemba.identify.bench.problem import BenchProblem, bench_problem
 from kemba.identify.bench.validate import contradictions
 from kemba.identify.logs.gate import limits_of
@@ -180,7 +180,7 @@ def test_two_clocks_that_drift_apart_are_known(
 
 def test_a_drift_is_looked_for_in_the_first_rows_only(bench_log: BenchLog) -> None:
     log = bench_log(duration=1.0)
-    with patch.multiple(ClockSettings, rows=2500):
+    with patch("kemba.identify.bench.clocks.ROWS", 2500):
         found = looked_at([log, log, log, log])
     assert [len(one) for one in found] == [1000, 1000, 500]
     assert [len(one) for one in looked_at([log])] == [1000]

@@ -5,8 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from kemba.identify.bench.bench_log import position_noise, smooth_motion
-from kemba.identify.problem.noise import caution, difference_sigma, learn, whiten
-from kemba.identify.problem.sensor_noise import ChannelNoise
+from kemba.identify.problem.noise import ChannelNoise, caution, difference_sigma, learn, whiten
 
 
 @pytest.mark.parametrize("step", [0.0, 5e-5, 2e-4, 5e-4])

@@ -68,7 +68,7 @@ def test_a_condition_of_too_few_windows_is_no_bin() -> None:
 
 def test_a_p_value_is_never_zero() -> None:
     """Of 99 draws none is as good: as good as one in a hundred, no better is known."""
-    test = NullTest(np.arange(99.0), (), 40)
+    test = NullTest(np.arange(99.0), 40)
     assert test.p_value(1000.0) == 0.01
     assert test.p_value(-1.0) == 1.0
     assert test.p_value(98.0) == 0.02  # as good as the best counts
@@ -76,7 +76,7 @@ def test_a_p_value_is_never_zero() -> None:
 
 def test_few_pieces_cannot_make_a_small_p_value() -> None:
     """Five pieces have sixteen noises, each with its mirror image."""
-    few, enough = (NullTest(np.zeros(399), (), blocks) for blocks in (5, 7))
+    few, enough = (NullTest(np.zeros(399), blocks) for blocks in (5, 7))
     assert few.p_value(1000.0) == 1 / 16 and few.too_short
     assert enough.p_value(1000.0) == 1 / 64 and not enough.too_short
     assert few.needed == 7
@@ -84,8 +84,8 @@ def test_few_pieces_cannot_make_a_small_p_value() -> None:
 
 def test_the_threshold_is_the_quantile_of_the_draws() -> None:
     draws = np.arange(101.0) / 10
-    assert NullTest(draws, (), 40).threshold == pytest.approx(9.8)
-    assert NullTest(draws / 100, (), 40).threshold == 1.0, "less than a nat is nothing"
+    assert NullTest(draws, 40).threshold == pytest.approx(9.8)
+    assert NullTest(draws / 100, 40).threshold == 1.0, "less than a nat is nothing"
 
 
 def test_one_moment_convicts_nobody() -> None:

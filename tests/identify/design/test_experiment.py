@@ -10,7 +10,7 @@ from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 from typer.testing import CliRunner
 
 from kemba.errors import KembaError
-from kemba.identify.design.rig import RigCourseSettings, design_rig_test, propose
+from kemba.identify.design.rig import design_rig_test, propose
 from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings, contenders
 from kemba.model.spec import load_model
 from kemba.plant.rigs import load_rig
@@ -24,7 +24,7 @@ def short_search() -> Iterator[None]:
     with (
         few,
         patch.multiple(ExperimentSettings, tests=1),
-        patch.multiple(RigCourseSettings, longest=0.8),
+        patch("kemba.identify.design.rig.LONGEST", 0.8),
     ):
         yield
 

@@ -8,8 +8,8 @@ from toy_problem import Toy
 
 from kemba.identify.infer.cross_validation import within_tolerance
 from kemba.identify.infer.null_model import within_bounds
-from kemba.identify.infer.ranking import values
 from kemba.identify.infer.search import Search
+from kemba.identify.infer.verdict import values
 
 BOTH = ("bend", "drag")  # both follow the same speed: what one lacks the other takes
 

@@ -7,7 +7,7 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover
-from kemba.identify.infer.cross_validation import CrossValidationSettings, gained, window_powers
+from kemba.identify.infer.cross_validation import gained, window_powers
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import is_unsupported
 
@@ -37,7 +37,7 @@ def one_run_hums(size: float) -> Toy:
 def test_runs_are_left_out_whole() -> None:
     search = Search(Toy({"kick.a": 8.0}, runs=4))
     best = search.run()
-    parts = search.base.division.parts
+    parts = search.base.parts
     assert len(parts) == 16 and len(set(parts.tolist())) == 4
     assert len(window_powers(search, best)) == 4
     assert len(window_powers(search, best, fine=True)) == 16
@@ -56,7 +56,7 @@ def test_whole_runs_cannot_confirm_what_one_alone_shows(alone: float, idle: bool
     search = Search(one_run_hums(8.0))
     search.start()
     search.visit(("hum",))
-    with patch.multiple(CrossValidationSettings, alone=alone):
+    with patch("kemba.identify.infer.cross_validation.ALONE", alone):
         assert is_unsupported(search, ("hum",)) == idle
 
 

@@ -11,10 +11,9 @@ from twin.measure import Sensors
 
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.infer.formula import Formula, drift_columns, look
+from kemba.identify.infer.linear import NULL
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL
 from kemba.identify.logs.reading import read_logs
-from kemba.identify.problem.noise import DriftColumnSettings
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
 
@@ -28,7 +27,7 @@ def test_the_columns_have_the_variance_of_their_sensor(bench_log: BenchLog) -> N
     variance = np.sum((columns * widths) ** 2, axis=1)
     for run in np.unique(rows.run):
         assert np.mean(variance[rows.run == run]) == pytest.approx(1.0, rel=0.05)
-    with patch.multiple(DriftColumnSettings, size=3.0):
+    with patch("kemba.identify.problem.noise.DRIFT", 3.0):
         assert drift_columns(problem)[1] == pytest.approx(3.0 * widths)
 
 
@@ -38,7 +37,7 @@ def test_a_drift_is_no_formula(tmp_path: Path) -> None:
     paths, _ = bench_case(tmp_path, None, sensors=sensors, chambers="first_order", **options)
     logs = list(read_logs(paths))
     assert _formula(logs) is None
-    with patch.multiple(DriftColumnSettings, size=1e-6):
+    with patch("kemba.identify.problem.noise.DRIFT", 1e-6):
         assert _formula(logs) is not None
     for log in logs:
         log.columns["piston/F [N]"] -= 400.0 * (log.columns["piston/x [m]"] - 0.035)

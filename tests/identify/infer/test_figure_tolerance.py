@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.identify.infer.linear import Linear
-from kemba.identify.infer.spike_slab import NULL, Ranker
+from kemba.identify.infer.linear import NULL, Linear, Ranker
 from kemba.identify.problem.problem import Candidate, Parameter
 
 SUPPLY = Candidate("supply", Parameter("k", size=0.1))

@@ -9,9 +9,8 @@ from kemba.effects.pneumatics.supply import SupplyLine
 from kemba.identify.infer.null_model import Baseline
 from kemba.identify.infer.structure import fitted_figures
 from kemba.identify.infer.windows import error_ratio
-from kemba.identify.problem.candidates import by_default
+from kemba.identify.problem.candidates import LINE, by_default, line_candidates
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
-from kemba.identify.problem.structure import LINE, line_candidates
 from kemba.model import Model, load_model
 
 TRUE = {"tau": 0.02, "pull": 3.0}

@@ -10,9 +10,9 @@ from toy_problem import Toy
 
 from kemba.identify.infer import formula
 from kemba.identify.infer.formula import by_chance, look
+from kemba.identify.infer.linear import NULL
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.significance import BootstrapSettings, NullTest
-from kemba.identify.infer.spike_slab import NULL
+from kemba.identify.infer.significance import RARE, NullTest
 
 
 @pytest.mark.parametrize("width", [0.3, 1.0, 10.0])
@@ -22,12 +22,12 @@ def test_the_best_of_many_absent_terms_passes_less_often_than_a_p_value(width: f
     z = rng.standard_normal((20_000, 36))
     gain = 0.5 * z**2 * width**2 / (1.0 + width**2) - 0.5 * np.log(1.0 + width**2)
     false = np.mean(gain.max(axis=1) > by_chance(36))
-    assert false <= BootstrapSettings.rare
+    assert false <= RARE
 
 
 def test_a_stricter_p_value_asks_for_more() -> None:
     usual = by_chance(36)
-    with patch.multiple(BootstrapSettings, rare=0.01):
+    with patch("kemba.identify.infer.formula.RARE", 0.01):
         assert by_chance(36) == pytest.approx(usual + np.log(2.0))
     assert by_chance(72) == pytest.approx(usual + np.log(2.0))
 
@@ -36,7 +36,7 @@ def test_slow_noise_is_taken_for_a_formula_less_often(monkeypatch: pytest.Monkey
     """Noise that lasts for 10 ms: terms gain more by it than the best of as many may by chance."""
     searches = [searched(seed) for seed in range(40)]
     found = sum(look(search, NULL) is not None for search in searches)
-    careless = NullTest(np.zeros(10), (), 200)
+    careless = NullTest(np.zeros(10), 200)
     monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
     alarms = sum(look(search, NULL) is not None for search in searches)
     assert alarms >= 6 and found <= alarms // 2
@@ -47,7 +47,7 @@ def test_a_term_of_less_force_than_every_model_leaves_is_no_formula(
 ) -> None:
     """A fifth of a usual friction is what every model leaves; the same term counts where it is
     more."""
-    careless = NullTest(np.zeros(10), (), 200)
+    careless = NullTest(np.zeros(10), 200)
     monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
     search = next(s for s in map(searched, range(40)) if look(s, NULL) is not None)
     found = look(search, NULL)
@@ -73,7 +73,7 @@ def test_a_formula_gains_more_over_the_catalogues_answer_than_chance_gives(
     monkeypatch: pytest.MonkeyPatch, nearly: float, found: bool
 ) -> None:
     """The catalogue's answer is `nearly` nats further from it than the best of as many terms."""
-    careless = NullTest(np.zeros(10), (), 200)
+    careless = NullTest(np.zeros(10), 200)
     monkeypatch.setattr(formula, "bootstrap", lambda *arguments: careless)
     search = next(s for s in map(searched, range(40)) if look(s, NULL) is not None)
     alone = look(search, NULL)

@@ -8,15 +8,15 @@ import pytest
 from toy_problem import Toy
 
 from kemba.identify.discover import discover, what_shows
+from kemba.identify.infer.linear import NULL, Ranker
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.significance import expected, null_test
-from kemba.identify.infer.spike_slab import NULL, Ranker
 from kemba.identify.preview import splitting_test
 
 
 def prepared(problem: Toy) -> Search:
     search = Search(problem)
-    search.prepare()
+    search.start()
     return search
 
 

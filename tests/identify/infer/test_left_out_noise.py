@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kemba.identify.infer.significance import LeftOutNoiseSettings, left_out_noise
+from kemba.identify.infer.significance import MOST, left_out_noise
 from kemba.identify.problem.problem import Array, Labels
 
 BLOCKS, ROWS, EFFECTS = 24, 50, 12
@@ -61,7 +61,7 @@ def test_what_acts_in_one_block_only_is_not_all_noise() -> None:
     left = fitted(jacobian, measured, width, slice(None))
     own = jacobian[:, 0] @ left
     found = left_out_noise(jacobian, left, width, LABELS)
-    assert found[3, 0] == pytest.approx(LeftOutNoiseSettings.most * own)
+    assert found[3, 0] == pytest.approx(MOST * own)
     assert abs(found[3, 0]) < 0.01 * (jacobian[:, 0] @ measured)
 
 

@@ -5,9 +5,8 @@ import pytest
 
 from kemba.identify.discover import discover
 from kemba.identify.infer.joint import joint_fit
-from kemba.identify.infer.linear import linearise, time_blocks
-from kemba.identify.infer.mode import mode_of
-from kemba.identify.infer.spike_slab import NULL, Ranker
+from kemba.identify.infer.linear import NULL, Ranker, linearise, time_blocks
+from kemba.identify.infer.null_model import mode_of
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 
 ROW, RUNS = 1e-3, 3  # s

@@ -9,11 +9,10 @@ from toy_problem import Toy
 from kemba.identify.answer import ENDED, HELD_OUT, Answer, Ranked, Value, phrase
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
-from kemba.identify.infer.ranking import values
+from kemba.identify.infer.linear import NULL, SpikeSlabSettings, probabilities
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, material
-from kemba.identify.infer.spike_slab import NULL, SpikeSlabSettings, probabilities
-from kemba.identify.infer.verdict import caveats_of, verdict_on
+from kemba.identify.infer.verdict import caveats_of, values, verdict_on
 from kemba.plotting.studies import plot_steps
 
 

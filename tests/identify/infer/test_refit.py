@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import least_squares
 from toy_problem import Toy
 
+from kemba.identify.infer.linear import SpikeSlabSettings
 from kemba.identify.infer.refit import Frozen, refit
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
 from kemba.identify.problem.problem import Array, Candidate, Parameter, Problem, Rows, Theta
 
 

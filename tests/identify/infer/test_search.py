@@ -3,8 +3,8 @@
 import pytest
 from toy_problem import Toy
 
+from kemba.identify.infer.linear import NULL
 from kemba.identify.infer.search import Search
-from kemba.identify.infer.spike_slab import NULL
 
 
 def test_an_answer_that_grows_never_shrinks(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,7 +7,7 @@ from toy_problem import Toy
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.infer.joint import JointFit
-from kemba.identify.infer.ranking import equivalents
+from kemba.identify.infer.linear import NULL, Hypothesis
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import (
     Selection,
@@ -19,8 +19,7 @@ from kemba.identify.infer.selection import (
     selected,
     simplest,
 )
-from kemba.identify.infer.spike_slab import NULL, Hypothesis
-from kemba.identify.infer.verdict import caveats_of, verdict_on
+from kemba.identify.infer.verdict import caveats_of, equivalents, verdict_on
 
 
 def windowed(truth: dict[str, float], seed: int = 0, artefact: float = 0.0) -> Toy:

@@ -14,16 +14,15 @@ from scipy.stats import kstest, norm
 from toy_problem import EFFECTS, Toy
 
 from kemba.identify.discover import discover
+from kemba.identify.infer.linear import NULL, SpikeSlabSettings
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, selected
 from kemba.identify.infer.significance import (
     NullTest,
-    _evidence,
     best_gain,
     bootstrap,
     smallest_detectable,
 )
-from kemba.identify.infer.spike_slab import SpikeSlabSettings
 
 MACHINES = 200
 SIZE = 10.0  # N; the size of every effect of the toy
@@ -94,7 +93,7 @@ def test_the_best_of_the_pairs_does_not_count_as_one_effect() -> None:
 def test_what_chance_does_as_often_is_not_believed() -> None:
     """The search names an effect; every simulated log looks better."""
     found = search(a=3.0)
-    p_value = NullTest(np.full(99, 50.0), (), 40).p_value(best_gain(found))
+    p_value = NullTest(np.full(99, 50.0), 40).p_value(best_gain(found))
     assert selected(found, ("a",), p_value) == Selection()
 
 
@@ -134,6 +133,7 @@ def test_what_simulated_logs_say_of_one_effect_is_what_the_ranking_says() -> Non
     hypotheses = ((), *((effect,) for effect in EFFECTS))
     found, expected = [], []
     for tolerance in SpikeSlabSettings.tolerances:
-        found.append(_evidence(ranker, list(EFFECTS), ranker._slope[:, None], tolerance)[:, 0])
+        slopes = ranker._slope[:, None]
+        found.append(ranker._beside(NULL, list(EFFECTS), slopes, tolerance)[:, 0])
         expected.append([ranker._score(h, tolerance).log_evidence for h in hypotheses])
     assert found - found[0][0] == pytest.approx(np.array(expected) - expected[0][0], abs=1e-6)

@@ -16,8 +16,7 @@ from kemba.identify.answer import Answer, Ranked, Value
 from kemba.identify.discover import discover
 from kemba.identify.infer.structure import _verdict, is_mixture, joined
 from kemba.identify.infer.windows import excess
-from kemba.identify.problem.candidates import by_default
-from kemba.identify.problem.structure import ORIFICE, structure_candidates
+from kemba.identify.problem.candidates import ORIFICE, by_default, structure_candidates
 from kemba.identify.robot.problem import robot_problem
 from kemba.model import Model, load_model
 from kemba.model.spec import load_spec

@@ -12,9 +12,9 @@ from kemba.identify.answer import ENDED
 from kemba.identify.bench.problem import bench_problem
 from kemba.identify.discover import discover
 from kemba.identify.infer.cross_validation import figures_off, window_gain
+from kemba.identify.infer.linear import NULL
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, is_unsupported
-from kemba.identify.infer.spike_slab import NULL
 from kemba.identify.infer.verdict import caveats_of, verdict_on
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory

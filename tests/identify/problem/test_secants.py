@@ -72,8 +72,8 @@ def test_other_effects_are_moved_by_their_size() -> None:
 
 def test_a_step_to_where_nothing_can_be_predicted_is_left_out() -> None:
     """A length that leaves no volume to the air on one side would count 1e16 sigmas."""
-    base, there = np.array([1.0, 2.0]), [np.array([2.0, 4.0]), np.array([0.0, 1e16])]
-    np.testing.assert_allclose(mean_slope(base, there, [0.5, -0.5]), [2.0, 4.0])
-    np.testing.assert_allclose(mean_slope(base, there[:1] * 2, [0.5, -0.5]), 0.0)
-    broken = [np.array([np.nan, 0.0]), np.array([np.inf, 0.0])]
-    np.testing.assert_allclose(mean_slope(base, broken, [0.5, -0.5]), 0.0)
+    base, there = np.array([1.0, 2.0]), [(np.array([2.0, 4.0]), 0.5), (np.array([0.0, 1e16]), -0.5)]
+    np.testing.assert_allclose(mean_slope(base, there), [2.0, 4.0])
+    np.testing.assert_allclose(mean_slope(base, [(there[0][0], h) for h in (0.5, -0.5)]), 0.0)
+    broken = [(np.array([np.nan, 0.0]), 0.5), (np.array([np.inf, 0.0]), -0.5)]
+    np.testing.assert_allclose(mean_slope(base, broken), 0.0)

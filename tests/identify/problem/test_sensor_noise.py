@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from kemba.identify.problem.sensor_noise import (
+from kemba.identify.problem.noise import (
     ChannelNoise,
     ColourSettings,
-    Kind,
     chosen_noise,
-    weighted,
 )
 
 COLOUR, DRIFT = 8e-3, 1.0  # s
@@ -19,12 +17,11 @@ def learnt(noise: ChannelNoise, most: float, rows: float = 2000.0) -> ChannelNoi
     settings = ColourSettings
     apart = 1e-3 * np.array(settings.lags)
     memories = (0.0, *settings.memories, *settings.drifts)
-    kinds = [ChannelNoise(0.0, ((1.0, m),)) if m else ChannelNoise() for m in memories]
-    columns = [kind.covariance(apart)[None, :] for kind in kinds]
+    kinds = {m: ChannelNoise(0.0, ((1.0, m),)) if m else ChannelNoise() for m in memories}
+    made = {(0, m): kind.covariance(apart)[None, :] for m, kind in kinds.items()}
     measured = noise.covariance(apart)[None, :]
-    a, b = weighted(columns, measured, np.full(measured.shape, rows))
-    named = [Kind(0, m) for m in memories]
-    return chosen_noise(a, b, named, np.array([most]), np.array([True]))[0]
+    counts = np.full(measured.shape, rows)
+    return chosen_noise(made, measured, counts, np.array([most]), np.array([True]))[0]
 
 
 def test_a_large_drift_does_not_hide_the_colour_beside_it() -> None:

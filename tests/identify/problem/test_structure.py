@@ -1,6 +1,6 @@
 """Structures that a search may build in: their parameters are found by the name of their kind."""
 
-from kemba.identify.problem.structure import LINE, LineResistance, line_candidates
+from kemba.identify.problem.candidates import LINE, LineResistance, line_candidates
 from kemba.model import Model, load_model
 
 

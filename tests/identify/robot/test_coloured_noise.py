@@ -10,9 +10,9 @@ from twin import catalogue, measure
 
 from kemba.identify.compare.compare import compare
 from kemba.identify.discover import discover
-from kemba.identify.infer.null_model import DriftSettings, log_likelihood, with_learnt_colour
-from kemba.identify.problem.sensor_noise import ChannelNoise
-from kemba.identify.robot.noise import coloured, simulated
+from kemba.identify.infer.null_model import STRONG, log_likelihood, with_learnt_colour
+from kemba.identify.problem.noise import ChannelNoise
+from kemba.identify.robot.filter import coloured, simulated
 from kemba.identify.robot.problem import RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -90,7 +90,7 @@ def test_logs_tell_whether_their_sensors_drift(drift: float) -> None:
     drifting = found.drifting()
     assert drifting is not None and drifting.drifting() is None
     gain = log_likelihood(drifting, {}) - log_likelihood(found, {})
-    assert (gain > DriftSettings.strong) == (drift > 0.0)
+    assert (gain > STRONG) == (drift > 0.0)
 
 
 @pytest.mark.parametrize(

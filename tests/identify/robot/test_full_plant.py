@@ -11,7 +11,7 @@ from full_plant import answered, plant_log, written
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.structure import fitted_figures
 from kemba.identify.infer.windows import error_ratio
-from kemba.identify.problem.structure import LINE, ORIFICE
+from kemba.identify.problem.candidates import LINE, ORIFICE
 from kemba.identify.robot.problem import robot_problem
 from kemba.identify.workflow import compare_logs
 from kemba.model import load_model

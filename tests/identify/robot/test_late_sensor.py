@@ -11,7 +11,7 @@ from twin.cases import robot_case
 
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.infer.cross_validation import HeldOut
-from kemba.identify.infer.spike_slab import NULL
+from kemba.identify.infer.linear import NULL
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.robot.problem import RobotProblem, robot_problem

@@ -10,8 +10,9 @@ pytest.importorskip("numba")
 from robot_logs import hops
 from twin import catalogue, measure
 
+from kemba.identify.logs.reading import thinned
 from kemba.identify.problem.problem import Problem
-from kemba.identify.robot.noise import predicted_error
+from kemba.identify.robot.filter import predicted_error
 from kemba.identify.robot.problem import PREDICTED, RobotProblem, robot_problem
 from kemba.model.spec import load_model
 from kemba.trajectory import Trajectory
@@ -126,20 +127,20 @@ def test_gaps_and_a_log_that_begins_in_the_air_are_borne() -> None:
     assert np.sqrt(np.mean(r**2)) < 1.15
 
 
-def test_denser_rows_are_averaged_and_sparse_ones_bridged() -> None:
+def test_denser_rows_are_thinned_and_sparse_ones_bridged() -> None:
     (log, *_), _ = hops(runs=1)
     valves = [n for n in log.names if "valve" in n or "tau" in n]
     for step in (0.25e-3, 2e-3):
         times = np.arange(log.time[0], log.time[-1], step)
         again = log.interpolate(times, hold=valves)
-        problem = robot_problem([again], load_model("planning"))
+        problem = robot_problem([thinned(again)], load_model("planning"))
         assert 0.7e-3 <= np.median(problem.batch.h[problem.batch.valid]) <= 1.6e-3
         assert np.isfinite(problem.residual({})).all()
 
 
 def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> None:
     """No effect with a memory, and each by itself."""
-    physics, forces = clean.physics, clean.state.forces
+    physics, state = clean.physics, clean.state
     delays = np.zeros((2 * len(physics.legs), 2))
     sizes = {c.key: c.lead.off + c.lead.size for c in clean.candidates.values()}
     switches = [physics.names[i] for i in physics._switches]
@@ -150,8 +151,8 @@ def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> N
             p[physics.names.index(name)] = sizes[name]
         few = physics.states_at(p)
         few_force, whole = (
-            physics.call("residual", *clean.state.motion.middle, *states, p=p)[0]
-            for states in (forces.states(p, delays, few), forces.states(p, delays, None))
+            physics.call("residual", *state.motion.middle, *states, p=p)[0]
+            for states in (state.states(p, delays, few), state.states(p, delays, None))
         )
         assert few_force == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
     assert len(physics.states_at(physics.nominal)) < physics.states.count
