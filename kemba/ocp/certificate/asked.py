@@ -97,8 +97,7 @@ def measured(
     """
     last_one = "phases" in plan.meta or task.refine != "radau"
     course = _Course.of(model, requirements if last_one else (), plan)
-    listed = (r for r in requirements if r.location[0] != "contacts")  # measured by their order
-    found = [_on_plan(requirement, task, plan, course) for requirement in listed]
+    found = [_on_plan(requirement, task, plan, course) for requirement in _at_nodes(requirements)]
     return (*found, *_of_the_task(model, task, requirements, plan))
 
 
@@ -119,7 +118,7 @@ def on_execution(
     """
     clock, found = plan.time - plan.time[0], []
     landed = min(read(plan, PLANNED, clock=clock).landing, float(clock[-1]))
-    for requirement in asked:
+    for requirement in _at_nodes(asked):
         quantity = requirement.quantity
         if quantity.unit not in ("m", "rad") or requirement.minus is not None:
             continue
@@ -143,6 +142,11 @@ def on_execution(
         ]
         found += [m for m in each if not m.met][:1] or each[:1]
     return tuple(found)
+
+
+def _at_nodes(requirements: Iterable[Requirement]) -> list[Requirement]:
+    """Those that hold at nodes or between them; contacts are measured by their order."""
+    return [r for r in requirements if r.location[0] != "contacts"]
 
 
 def _on_plan(

@@ -294,7 +294,8 @@ class Refiner:
             return program.phases
         lasts = [p.elements * float(x) for p, x in zip(program.phases, found.Y[h], strict=True)]
         nodes = max(program.nodes, SEVERAL * len(lasts))
-        fractions = [w.at for w in self.requirements if w.at is not None]
+        asked = [w for w in self.requirements if w.location[0] != "contacts"]
+        fractions = [at for w in asked for at in (w.during if w.at is None else (w.at,))]
         return shared(program.phases, lasts, nodes, fractions) or program.phases
 
     def _by(
