@@ -27,7 +27,7 @@ from kemba.ocp.refinement.start import carried, solve_along, warm
 from kemba.ocp.transcription.layout import STEP
 
 FAR = 0.1  # of the worst misfit
-FITS = 1e-7  # scaled; slacks of modes that fit were 3e-8 at most, of the others 9e-7 at least
+FITS = 10.0  # times the tolerance of rows: a larger slack is no rounding
 
 
 class Misfit(NamedTuple):
@@ -45,11 +45,11 @@ def misfits(program: PhaseProgram, x: np.ndarray) -> list[Misfit]:
 
     With an exact penalty, slacks of modes that fit are zero to the solver's tolerance.
     """
-    found = []
+    found, fits = [], FITS * Refining.rough_rows
     for soft in program.soft:
         for way, side in ((soft.above, 1), (soft.below, -1)):
             for e, size in zip(soft.elements, x[way], strict=True) if way is not None else ():
-                if size > FITS:
+                if size > fits:
                     found.append(Misfit(int(e), soft.constraint, soft.kind, side, float(size)))
     return sorted(found)
 
