@@ -321,10 +321,11 @@ def on_ticks(program: PhaseProgram, x: np.ndarray) -> None:
     (size,)."""
     h, phases = program.columns.h[:, 0], program.phases
     elements = np.array([phase.elements for phase in phases])
-    lasts, *limits = (elements * at[h] * STEP for at in (x, program.lower, program.upper))
+    lasts, shortest, longest = (elements * at[h] * STEP for at in (x, program.lower, program.upper))
     borders = np.concatenate([[0.0], np.cumsum(lasts)[:-1]])
     known = program.model, program.reduction, phases, borders
-    for p, time in edge_times(*known, *limits, program.task.min_dwell).items():
+    times = edge_times(*known, shortest, longest, program.task.min_dwell)
+    for p, time in times.items():
         z = ca.SX.sym("h", p)
         begins = ca.dot(z, ca.DM([phase.elements for phase in phases[:p]]))
         program.add("valve edge", z, begins, time / STEP, time / STEP, [h[:p]])
