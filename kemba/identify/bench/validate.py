@@ -45,9 +45,11 @@ def contradictions(run: BenchLog, stroke: float, predict: Predict) -> list[Kemba
     as_read, force = _left(run, predict), run.measured["piston/F"][run.keep["piston/F"]]
     if not as_read or as_read[()] < (small := SMALL * run.sigma["piston/F"] / _spread(force)):
         return []
-    trials = {
+    trials = {more: (run, more, left) for more, left in as_read.items()}
+    trials |= {
         some + more: (trial, more, left)
         for some, trial in mix_ups(run, stroke)
+        if some
         for more, left in _left(trial, predict).items()
     }
     simple = simplest({texts: left for texts, (_, _, left) in trials.items()}, small)
