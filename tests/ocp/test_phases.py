@@ -13,7 +13,7 @@ import pytest
 from kemba.ocp import Plan, load_task, plan
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control
-from kemba.ocp.phases.mesh import shared
+from kemba.ocp.phases.mesh import meshed
 from kemba.ocp.phases.modes import OPEN, Phase
 from kemba.ocp.phases.radau import RADAU3, RADAU5, Scheme
 from kemba.ocp.phases.settings import ModeConstraints, Refining
@@ -126,12 +126,12 @@ def test_closed_contacts_do_not_drift_even_on_few_nodes() -> None:
 def test_a_phase_gets_elements_by_how_long_it_lasts() -> None:
     """A phase read off a single node would last two nominal steps at most."""
     phases = [Phase(0, 1, (1,), (0.0,)), Phase(1, 9, (0,), (0.0,)), Phase(9, 10, (1,), (0.0,))]
-    found = shared(phases, [3.0, 4.0, 3.0], 20, [0.0, 1.0])
+    found = meshed(phases, [3.0, 4.0, 3.0], 20, [0.0, 1.0])
     assert found is not None
     assert [p.elements for p in found] == [6, 8, 6]
     assert [(p.modes, p.valves) for p in found] == [(p.modes, p.valves) for p in phases]
-    assert shared(phases, [3.0, 4.0, 3.0], 2, [0.0, 1.0]) is None
-    assert shared(phases, [3.0, 4.0, 3.0], 20, [0.5]) is None  # inside a phase
+    assert meshed(phases, [3.0, 4.0, 3.0], 2, [0.0, 1.0]) is None
+    assert meshed(phases, [3.0, 4.0, 3.0], 20, [0.5]) is None  # inside a phase
 
 
 def test_phases_cover_the_motion_and_touch_down_once_for_a_clean_jump() -> None:

@@ -62,7 +62,7 @@ def test_the_same_plan_with_five_stages_an_element_executes_more_exactly() -> No
     assert [p.stages.stages for p in plans if p.stages] == [3, 5, 5]
     assert off_ticks(plans[2].model, plans[2]) < 1e-8
     errors = [replay(p.model, p.trajectory).final_error_m for p in plans[:2]]
-    assert errors[1] < errors[0]
+    assert errors[1] < 0.5 * errors[0]
     assert plans[1].objective == pytest.approx(plans[0].objective, rel=0.02)
 
 

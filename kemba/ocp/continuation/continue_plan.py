@@ -21,14 +21,13 @@ from kemba.ocp.controller import PERIOD, ValveEdges, rounded
 from kemba.ocp.nlp import ipopt
 from kemba.ocp.nlp.ending import Ending, Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
-from kemba.ocp.phases.mesh import shared
+from kemba.ocp.phases.mesh import meshed
 from kemba.ocp.phases.mode_constraints import ContradictionError
 from kemba.ocp.phases.modes import Phase, noted_phases
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5, RADAU9
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.refinement.proximal import proximal_points
 from kemba.ocp.refinement.refine import Refined, Refiner, read, reduction_of, refine, valve_columns
 from kemba.ocp.refinement.start import on_elements, solve_along, warm
 from kemba.ocp.relaxation.session import Attempt
@@ -165,21 +164,6 @@ class Continuation:
             known = ipopt.central(mu, Refining.push)
         stagnation = Stagnation(Continuing.patience, Continuing.underway, Refining.slow)
         found = solve_along(program, begin, options | known, self.control, stagnation)
-
-        def make(near: PhaseProgram, x: np.ndarray) -> tuple[PhaseProgram, np.ndarray]:
-            new, x = refiner.build(mesh.phases, (near, x), near.scheme)
-            if self.origin.ticks:
-                on_ticks(new, x)
-            return new, x
-
-        def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
-            return solve_along(program, Iterate(x), options, self.control, stagnation)
-
-        assert found.ending is not None
-        near = self.origin.ticks or self.origin.finer  # the plan changes little
-        if near and not found.solved and not found.ending.cut_short:
-            self.tell(f"from {self.origin.name}: by steps that stay near it")
-            program, found = proximal_points(make, solve, program, x) or (program, found)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)
@@ -230,10 +214,10 @@ def renoded(
 ) -> tuple[Trajectory, list[Phase]] | None:
     """The plan on `nodes` intervals and its phases there, each with intervals by how long it lasts;
     without `even` in proportion to those it has, so that what the task asks at nodes stays at the
-    same moments; see `shared`."""
+    same moments; see `meshed`."""
     t = plan.time
     lasts = [float(t[p.last] - t[p.first] if even else p.elements) for p in phases]
-    found = shared(phases, lasts, nodes, marks)
+    found = meshed(phases, lasts, nodes, marks)
     if found is None:
         return None
     return _resampled(plan, phases, [p.elements for p in found]), found

@@ -9,7 +9,7 @@ import numpy as np
 from kemba.ocp.phases.modes import Phase
 
 
-def shared(
+def meshed(
     phases: Sequence[Phase], lasts: Sequence[float], nodes: int, marks: Sequence[float]
 ) -> list[Phase] | None:
     """The phases with elements in proportion to `lasts` (phases,), at least one each, `nodes` in

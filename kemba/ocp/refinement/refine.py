@@ -14,7 +14,7 @@ from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.between import add_missed
-from kemba.ocp.phases.mesh import shared
+from kemba.ocp.phases.mesh import meshed
 from kemba.ocp.phases.mode_constraints import (
     ContradictionError,
     Independent,
@@ -26,8 +26,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, RADAU9, STATE, Scheme
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.refinement.proximal import Solution, proximal_points
-from kemba.ocp.refinement.repair import misfits, repaired, simplified, with_pulses
+from kemba.ocp.refinement.repair import Solution, misfits, repaired, simplified, with_pulses
 from kemba.ocp.refinement.start import (
     carried,
     certificate,
@@ -132,7 +131,7 @@ class Refiner:
     tell: Tell = silent
     iterations: int = 0
     seen: list[list[Phase]] = field(default_factory=list)  # phases that were tried
-    solution: tuple[PhaseProgram, Iterate] | None = None  # by the finer scheme
+    solution: Solution | None = None  # by the finer scheme
 
     def marks(self, nodes: int) -> list[int]:
         """Those of `nodes` at which the task asks for something: phases end there."""
@@ -266,25 +265,23 @@ class Refiner:
         return found
 
     def fine(self, coarser: PhaseProgram, start: Iterate) -> Refined:
-        """The exact program with the finer scheme, from a solution with the coarser one; with
-        elements shared anew where a phase would last longer than its elements can, and with more
-        stages where it misses what the certificate allows."""
+        """The exact program with the finer scheme, from a solution with the coarser one; once more
+        on other elements where a phase would last longer than its own can."""
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
-        solution, made = self._by(RADAU5, coarser.phases, coarser, start)
-        phases = self.evened(*solution) if made.solved else coarser.phases
+        solution = self._finer(coarser.phases, coarser, start)
+        phases = self.evened(*solution) if solution[1].solved else coarser.phases
         if phases != coarser.phases:
             self.tell("phases: on elements shared by how long phases last")
-            even, better = self._by(RADAU5, phases, *solution)
-            if better.solved:
-                solution, made = even, better
-        if made.solved and not self._keeps(made):
-            self.tell("phases: with more stages in every element")
-            finest, better = self._by(RADAU9, solution[0].phases, *solution)
-            if self._keeps(better):
-                solution, made = finest, better
-        if made.solved:
+            even = self._finer(phases, *solution)
+            solution = even if even[1].solved else solution
+        if solution[1].solved:
             self.solution = solution
-        return made
+        return read(*solution)
+
+    def _finer(self, phases: Sequence[Phase], other: PhaseProgram, start: Iterate) -> Solution:
+        """The exact program of phases in the order of those of another one, solved from there."""
+        program, x = self.build(phases, (other, start.Y), RADAU5)
+        return program, self._solve(program, x, warm(Refining.rough_iterations))
 
     def evened(self, program: PhaseProgram, found: Iterate) -> list[Phase]:
         """The phases of a program; where one of them lasts as long in a solution as its elements
@@ -296,27 +293,7 @@ class Refiner:
         nodes = max(program.nodes, SEVERAL * len(lasts))
         asked = [w for w in self.requirements if w.location[0] != "contacts"]
         fractions = [at for w in asked for at in (w.during if w.at is None else (w.at,))]
-        return shared(program.phases, lasts, nodes, fractions) or program.phases
-
-    def _by(
-        self, scheme: Scheme, phases: Sequence[Phase], other: PhaseProgram, start: Iterate
-    ) -> tuple[Solution, Refined]:
-        """The exact program of some phases with a scheme, from a solution of another one of the
-        same order; where that fails, by proximal points."""
-
-        def make(near: PhaseProgram, x: np.ndarray) -> tuple[PhaseProgram, np.ndarray]:
-            return self.build(phases, (near, x), scheme)
-
-        def solve(program: PhaseProgram, x: np.ndarray) -> Iterate:
-            return self._solve(program, x, warm(Refining.rough_iterations))
-
-        program, x = make(other, start.Y)
-        solution = program, solve(program, x)
-        ending = solution[1].ending
-        if not solution[1].solved and not (ending and ending.cut_short):
-            self.tell("phases: by steps that stay near the last plan")
-            solution = proximal_points(make, solve, other, start.Y) or solution
-        return solution, read(*solution)
+        return meshed(program.phases, lasts, nodes, fractions) or program.phases
 
     def _keeps(self, found: Refined) -> bool:
         """Whether a plan keeps to all that its certificate measures."""

@@ -22,10 +22,10 @@ from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.settings import Elements, Refining
-from kemba.ocp.refinement.proximal import Solution
 from kemba.ocp.refinement.start import carried, solve_along, warm
 from kemba.ocp.transcription.layout import STEP
 
+Solution = tuple[PhaseProgram, Iterate]
 FAR = 0.1  # of the worst misfit
 FITS = 10.0  # times the tolerance of rows: a larger slack is no rounding
 
