@@ -4,9 +4,10 @@
     python benchmarks/motions.py --robot hound --motion bound platform
     python benchmarks/motions.py --save benchmarks/pages/plan-quality.md
 
-The shipped robot, `hound`, and `whippet`: one made for this study alone, shorter and lighter, with
-legs called bow and stern. Each task says the same with the robot's own legs. Everything from a
-guess, as `solve` plans it, without memory, within `--limit` seconds of the wall clock.
+The shipped robot, `hound`, and `whippet` (benchmarks/whippet): one made for the studies alone,
+shorter and lighter, with legs called bow and stern. Each task says the same with the robot's own
+legs. Everything from a guess, as `solve` plans it, without memory, within `--limit` seconds of the
+wall clock.
 """
 
 import argparse
@@ -29,6 +30,7 @@ from kemba.solve import Approach, Listener, best_plan
 from kemba.sweep import machine
 
 RECORD = Path(__file__).with_name("motions.jsonl")
+WHIPPET = Path(__file__).parent / "whippet" / "whippet.yaml"
 BEGIN, END = "<!-- written by benchmarks/motions.py -->", "<!-- end of motions -->"
 LEGS = {
     "kemba": {"front": "front", "rear": "rear"},
@@ -43,21 +45,6 @@ HEADS = ("a plan on nodes", "refined", "by its inputs", "by its table", "plant, 
 def shipped(folder: str, name: str) -> dict[str, Any]:
     """A shipped YAML file as data."""
     return dict(read(shipped_configs(folder)[f"{name}.yaml"].read_text()).data)
-
-
-def whippet() -> dict[str, Any]:
-    """A robot of this study: kemba with a body of 0.46 m and 2.4 kg, shanks and thighs 5 % shorter,
-    on kemba's cylinders."""
-    robot = shipped("robots", "kemba") | {"name": "whippet"}
-    robot["body"] = {"length": "0.46 m", "mass": "2.4 kg", "inertia": "0.085 kg.m2"}
-    robot["legs"] = {
-        "bow": {"hip": "0.23 m", "fold": 1},
-        "stern": {"hip": "-0.23 m", "fold": -1},
-    }
-    for part, length in (("femur", "0.230 m"), ("tibia", "0.222 m")):
-        robot["leg"][part] = robot["leg"][part] | {"length": length}
-    robot["leg"]["piston"] = robot["leg"]["piston"] | {"retracted": "0.1937 m"}
-    return robot
 
 
 def renamed(data: Any, legs: dict[str, str]) -> Any:
@@ -97,10 +84,8 @@ def written(motion: str, robot: str, folder: Path) -> Path:
     if robot != "kemba":
         base = task.get("model", "planning")
         model = {} if base == "planning" else shipped("models", base)
-        model |= {"name": robot, "base": "planning", "robot": robot}
-        if robot == "whippet":
-            dump_yaml(whippet(), folder / "whippet.yaml")
-            model["robot"] = "whippet.yaml"
+        named = str(WHIPPET) if robot == "whippet" else robot
+        model |= {"name": robot, "base": "planning", "robot": named}
         task["model"] = f"own-{base}.yaml"
         dump_yaml(model, folder / task["model"])
     for part in task.get("sequence", ()):

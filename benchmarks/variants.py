@@ -1,6 +1,6 @@
 """Jumps planned with and without what makes planning quick, in turns.
 
-    python benchmarks/variants.py [--block general] [--cases 16]
+    python benchmarks/variants.py [--block forward] [--cases 16]
 
 Prints means over the first cases of a block of the reliability sweep: iterations, those in which
 IPOPT shifted the Hessian and so factorised more than once, the cost (geometric), and the processor
@@ -43,14 +43,14 @@ class Variant:
 
 SHIPPED = Variant()
 VARIANTS: dict[str, dict[str, Variant]] = {
-    "general": {
+    "forward": {
         "as shipped": SHIPPED,
         "from the guess": Variant(grown=False),
         "plain Hessian": Variant({problem: {"REGULARISATION": 0.0}}),
         "changed plans at their bounds": Variant({Starts: {"changed": 1e-6}}),
         "memory by IPOPT's default": Variant(solver={"options": {"mumps_mem_percent": 1000}}),
     },
-    "symmetric": {
+    "jumps": {
         "as shipped": SHIPPED,
         "pairs relaxed by 1, 0.1 and 0.01 before": Variant(ladder=(1.0, 0.1, 0.01)),
         "pairs relaxed by 0.01 at first": Variant({Relaxation: {"loose": 1e-2}}),
@@ -104,7 +104,7 @@ def set_by(name: str) -> tuple[str, list[str]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--block", choices=VARIANTS, default="general")
+    parser.add_argument("--block", choices=VARIANTS, default="forward")
     parser.add_argument("--cases", type=int, default=16)
     parser.add_argument("--tasks", nargs="+", help="shipped tasks in the place of the sweep's")
     parser.add_argument("--variants", nargs="+", help="some of the block's, the first of all too")
@@ -118,7 +118,7 @@ def main() -> None:
     tasks = tasks or list(jumps(asked.block, asked.cases))
     found = [[figures(task, variant) for variant in variants.values()] for task in tasks]
     iterations, shifted, cost, seconds = np.moveaxis(np.array(found), -1, 0)  # (cases, variants)
-    print(f"{len(tasks)} {asked.block} jumps, {machine()}\n")
+    print(f"{len(tasks)} tasks of the block {asked.block}, {machine()}\n")
     print("| variant | iterations | shifted | cost [N².m².s] | CPU time |\n|---|" + "---:|" * 4)
     for k, name in enumerate(variants):
         ratio = seconds[:, k].sum() / seconds[:, 0].sum()
