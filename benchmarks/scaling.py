@@ -1,6 +1,6 @@
 """Solve time against the number of nodes, with the fitted exponent.
 
-    python benchmarks/scaling.py [--save benchmarks/pages/scaling.png] [--nodes 50 100]
+    python benchmarks/scaling.py [--save scaling.png] [--nodes 50 100]
 
 Prints the median CPU time of all solves of a plan, refined and executed as by default, how many
 times the median the longest one took, and the exponent p of time ~ N^p. Aims: p at most 1.1, and
