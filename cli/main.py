@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 import kemba
-from kemba_cli.common import with_verbose
+from kemba_cli.common import usual
 from kemba_cli.failures import guarded
 from kemba_cli.usage import Command, figure_at, is_new_folder, is_picture
 from kemba_cli.verbs.adopt import adopt
@@ -66,7 +66,7 @@ for panel, verbs in PANELS.items():
     for verb in verbs:
         name = "map" if verb is draft_map else verb.__name__  # `map` is a word of Python
         shape = PLACED.get(verb, Command)
-        app.command(name, cls=shape, rich_help_panel=panel)(with_verbose(guarded(verb)))
+        app.command(name, cls=shape, rich_help_panel=panel)(usual(guarded(verb)))
 
 
 def _version(wanted: bool) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Foreign, put_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -37,9 +37,6 @@ def discover(
         bool, typer.Option("--figures/--no-figures", hidden=True, help="Earlier name of --figure.")
     ] = True,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Find the physical effect that a model lacks, from logs of a robot or of a bench rig.
 
@@ -53,7 +50,7 @@ def discover(
 
     logs, holdout = log_files(logs), log_files(holdout or [])
     with claimed(out, "answer", "answer.json", force) as folder:
-        with Progress(quiet or json, DISCOVER, time_limit) as progress:
+        with Progress(DISCOVER, time_limit) as progress:
             answer, found = discover_logs(
                 logs, holdout, model, column_map, time_limit, progress.tell
             )
@@ -66,15 +63,14 @@ def discover(
 
                 draw_discovery(found, folder)
         finally:  # also when the disk is full: it took minutes
-            _tell(answer, folder, json, quiet)
-            say_next(after_discover(logs, column_map, model, folder), quiet or json)
+            _tell(answer, folder)
+            say_next(after_discover(logs, column_map, model, folder))
     if answer.verdict == "bad-data":
         raise typer.Exit(BAD_ANSWER)
 
 
-def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
-    if json:
-        print_json(answer.json())
+def _tell(answer: Answer, out: Path) -> None:
+    if put_json(answer.json()):
         return
     typer.echo(answer.sentence)
     if answer.ranking:
@@ -83,5 +79,5 @@ def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
         values = ", ".join(f"{name} = {value}" for name, value in ranked.parameters.items())
         typer.echo(f"  {100 * ranked.probability:5.1f} %  {ranked.effect:28s} {values}")
     for remark in answer.remarks:
-        say(remark, quiet)
-    say(f"{out}", quiet)
+        say(remark)
+    say(f"{out}")

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say, talk
+from kemba_cli.common import manner, put, say, talk
 
 EVERY = 10.0  # s between lines where no one watches
 
@@ -32,9 +32,6 @@ def sweep(
         float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
     ] = None,
     figure: Annotated[bool, typer.Option(help="Draw the executions of every block.")] = True,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Run many cases and show how many succeeded; the same command continues what was stopped.
 
@@ -52,8 +49,8 @@ def sweep(
     asked, document = room.load_sweep(file, list(overrides or []))
     with held(out or Path("sweeps") / asked.name) as folder:
         room.open_folder(folder, asked, document)
-        status, good = _run(folder, asked, document, scheduler, jobs, due, figure, json, quiet)
-    say_next(after_sweep(file, folder, status == "finished"), quiet or json)
+        status, good = _run(folder, asked, document, scheduler, jobs, due, figure)
+    say_next(after_sweep(file, folder, status == "finished"))
     if not good:
         raise typer.Exit(1)
 
@@ -66,18 +63,16 @@ def _run(
     jobs: int | None,
     due: float | None,
     figure: bool,
-    json: bool,
-    quiet: bool,
 ) -> tuple[str, bool]:
     """Do what is missing, write and print the results; the status, and whether all is well."""
     from kemba import sweep as room
 
-    say(f"results in {folder}", quiet or json)
+    say(f"results in {folder}")
     cases = room.expand(asked, document, folder)
     missing = {case.key for case in cases if case.record(folder) is None}
     status, records = "interrupted", {}
     try:
-        with Bar(len(missing), len({case.key for case in cases}), quiet or json) as bar:
+        with Bar(len(missing), len({case.key for case in cases})) as bar:
             left = None if due is None else max(0.1, due - time.monotonic())
             records = room.run_cases(cases, folder, scheduler, jobs, left, bar.tell)
         done = all(case.key in records for case in cases)
@@ -87,19 +82,15 @@ def _run(
         summary = room.write_results(folder, asked, cases, known, status)
     if figure:
         _figures(folder, cases, known, summary)
-    _answer(folder, status, summary, json)
+    _answer(folder, status, summary)
     return status, status == "finished" and bool(summary["good"])
 
 
-def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:
+def _answer(folder: Path, status: str, summary: dict[str, Any]) -> None:
     from kemba.sweep.results import sentence
 
-    if json:
-        print_json({"folder": folder, "status": status, **summary})
-        return
-    typer.echo(str(folder))
-    for name, block in summary["blocks"].items():
-        typer.echo(f"{name}: {sentence(block)}")
+    told = [f"{name}: {sentence(block)}" for name, block in summary["blocks"].items()]
+    put({"folder": folder, "status": status, **summary}, "\n".join([str(folder), *told]))
 
 
 def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) -> None:
@@ -126,15 +117,15 @@ def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) ->
 class Bar:
     """Progress over cases: a bar where someone watches, a line now and then elsewhere."""
 
-    def __init__(self, missing: int, total: int, quiet: bool) -> None:
-        self.done, self.total, self.quiet = total - missing, total, quiet
+    def __init__(self, missing: int, total: int) -> None:
+        self.done, self.total = total - missing, total
         self.began = self.told = time.monotonic()
         self.bar: Any = None
 
     def __enter__(self) -> Bar:
         if self.done:
-            say(f"{self.done} of {self.total} cases are done already", self.quiet)
-        if not self.quiet and talk().is_terminal:
+            say(f"{self.done} of {self.total} cases are done already")
+        if not manner.get().silent and talk().is_terminal:
             from rich.progress import Progress, TimeRemainingColumn
 
             columns = [*Progress.get_default_columns()[:-1], TimeRemainingColumn()]
@@ -158,4 +149,4 @@ class Bar:
                 self.bar.console.print(last, markup=False)
         elif not record["good"] or time.monotonic() > self.told + EVERY or self.done == self.total:
             self.told = time.monotonic()
-            say(f"{self.told - self.began:6.1f} s  {self.done}/{self.total}  {last}", self.quiet)
+            say(f"{self.told - self.began:6.1f} s  {self.done}/{self.total}  {last}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
+from kemba_cli.common import Force, Foreign, newest, put
 
 
 def view(
@@ -27,9 +27,6 @@ def view(
     column_map: Foreign = None,
     show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play, or for Rerun.
 
@@ -37,9 +34,9 @@ def view(
     """
     from kemba.report.view import record_run, view_run
 
-    shown, how = motion or newest(quiet), (model, force, column_map, run)
+    shown, how = motion or newest(), (model, force, column_map, run)
     path = view_run(shown, out, *how) if rerun is None else record_run(shown, rerun, *how)
-    print_json({"view": str(path)}) if json else typer.echo(path)
+    put({"view": str(path)}, path)
     if show and rerun is None:
         import webbrowser
 
