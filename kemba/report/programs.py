@@ -23,7 +23,7 @@ from kemba.ocp.relaxation.settings import Relaxation
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.transcribe import Parameters
 from kemba.runs import load_run
-from kemba.sensitivity.replanned import PlanProgram
+from kemba.sensitivity.table import PlanProgram
 from kemba.trajectory import Trajectory
 
 FUNCTIONS = ("nlp", "grad_f", "jac_g", "hess_lag")
