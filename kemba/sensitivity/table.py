@@ -27,6 +27,7 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU5
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.refine import Refiner, reduction_of, valve_columns
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import Reduction
@@ -150,8 +151,7 @@ def of_plan(
 ) -> list[Replanned]:
     """For every figure of `changed`, what one step of it changes; see `Replanned`. `stages`: the
     solved program of the plan, if it is at hand. Raises KembaError where it was not refined."""
-    PlanProgram.of(task, model, plan)
-    requirements = resolve(task, model, Document(task.model_dump()))
+    requirements, *_ = plan_phases(task, model, plan)
     origin = Origin(plan, model, tuple(requirements), once=True, stages=stages)
     ends = [[_again(origin, *side) for side in figure.sides()] for figure in changed]
     return [Replanned(*map(float, high - low)) for low, high in ends]
@@ -168,32 +168,28 @@ def _again(origin: Origin, task: Task, model: Model) -> Array:
     return np.array([cost, new.time[-1], landing if landing < np.inf else NAN, new["body/z"].max()])
 
 
-@dataclass
-class PlanProgram:
-    """The program of the phases of a refined plan; `built` makes it for any task and model."""
+def plan_phases(
+    task: Task, model: Model, plan: Trajectory
+) -> tuple[list[Requirement], Reduction, list[Phase]]:
+    """The phases of a refined plan of a task, with what is asked of it and the robot or half of it.
+    Raises KembaError where the plan was not refined."""
+    requirements = resolve(task, model, Document(task.model_dump()))
+    reduction = reduction_of(model, task, requirements, plan)
+    constraints = read_constraints(model, reduction)
+    valves = len(valve_columns(model, reduction))
+    phases = noted_phases(plan.meta, constraints, valves, len(plan) - 1)
+    if phases is None:
+        hint = "a plan that was refined has them, see `refine` of the task"
+        raise KembaError(task.name, "the plan has no phases", hint=hint)
+    return requirements, reduction, phases
 
-    plan: Trajectory
-    reduction: Reduction
-    phases: list[Phase]
 
-    @classmethod
-    def of(cls, task: Task, model: Model, plan: Trajectory) -> PlanProgram:
-        """The program of a plan of a task. Raises KembaError where the plan was not refined."""
-        requirements = resolve(task, model, Document(task.model_dump()))
-        reduction = reduction_of(model, task, requirements, plan)
-        constraints = read_constraints(model, reduction)
-        valves = len(valve_columns(model, reduction))
-        phases = noted_phases(plan.meta, constraints, valves, len(plan) - 1)
-        if phases is None:
-            hint = "a plan that was refined has them, see `refine` of the task"
-            raise KembaError(task.name, "the plan has no phases", hint=hint)
-        return cls(plan, reduction, phases)
-
-    def built(self, task: Task, model: Model) -> tuple[PhaseProgram, np.ndarray]:
-        """The program by the finer scheme, and its start (size,) from the plan."""
-        requirements = resolve(task, model, Document(task.model_dump()))
-        refiner = Refiner(model, task, requirements, self.plan, self.reduction, Control())
-        return refiner.build(self.phases, self.plan, RADAU5)
+def plan_program(task: Task, model: Model, plan: Trajectory) -> tuple[PhaseProgram, np.ndarray]:
+    """The program of the phases of a refined plan by the finer scheme, and its start (size,) from
+    the plan. Raises KembaError where the plan was not refined."""
+    requirements, reduction, phases = plan_phases(task, model, plan)
+    refiner = Refiner(model, task, requirements, plan, reduction, Control())
+    return refiner.build(phases, plan, RADAU5)
 
 
 @dataclass(frozen=True)

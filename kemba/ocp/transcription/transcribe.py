@@ -27,7 +27,7 @@ from kemba.model import Model
 from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.first_node import Held, granted, state_rows
+from kemba.ocp.transcription.first_node import granted, state_rows
 from kemba.ocp.transcription.layout import STEP, Layout
 from kemba.ocp.transcription.stage import (
     INF,
@@ -108,7 +108,7 @@ class Transcription:
         self._rest_before_start()
         stage = self.stage
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
-        self.held: list[Held] = []  # requirements that hold exactly at the first node
+        self.held: list[tuple[ca.SX, Requirement]] = []  # what holds exactly at the first node
         moments = self.requirement_blocks(index) + self._first_node_blocks(index)
         moments += self._aims(index) + self._soft_landing(index) + self._between_nodes(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
@@ -154,7 +154,7 @@ class Transcription:
         """
         if requirement.minus is None:
             if 0 in where:
-                self.held.append(Held(g, requirement.lower, requirement.upper))
+                self.held.append((g, requirement))
             variable = as_variable(g, self.stage.y)
             if variable is not None and self._tighten(where, variable, requirement):
                 return None
