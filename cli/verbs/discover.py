@@ -32,10 +32,7 @@ def discover(
     ] = None,
     column_map: Foreign = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
-    figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
-    figure: Annotated[  # what the option was called before
-        bool, typer.Option("--figures/--no-figures", hidden=True, help="Earlier name of --figure.")
-    ] = True,
+    figure: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
     force: Force = False,
 ) -> None:
     """Find the physical effect that a model lacks, from logs of a robot or of a bench rig.
@@ -58,7 +55,7 @@ def discover(
             for old in (file for name in WRITTEN for file in folder.glob(name)):
                 old.unlink()
             write_answer(answer, folder, model)
-            if figures and figure and found is not None:
+            if figure and found is not None:
                 from kemba.plotting.studies import draw_discovery
 
                 draw_discovery(found, folder)
