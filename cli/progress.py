@@ -71,6 +71,7 @@ LEARN: Course = {
 }
 REVIEW: Course = {**within(COMPARE, 0.0, 0.9), "drawing": 0.9}
 SIMULATE: Course = {"executing": 0.0}
+SWEEP: Course = {"case": 0.0}
 EXPERIMENT: Course = {"judging the standard": 0.0, "fitting the rivals": 0.8, "planning": 0.8}
 SENSITIVITY: Course = {"the same commands": 0.02, "the plan made anew": 0.35}
 
@@ -186,6 +187,13 @@ class Progress:
             self.bar.update(self.task, description=stage, completed=self.left.share)
         else:
             self._line(stage)
+
+    def remark(self, text: str) -> None:
+        """A line that stays, above the bar where there is one."""
+        if self.live:
+            self.bar.console.print(text, markup=False)
+        else:
+            say(text)
 
     def watch(self, iteration: int, objective: float, violation: float) -> None:
         """An iteration of the current stage."""

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import manner, put, say, talk
-
-EVERY = 10.0  # s between lines where no one watches
+from kemba_cli.common import put, say
 
 
 def sweep(
@@ -66,15 +63,32 @@ def _run(
 ) -> tuple[str, bool]:
     """Do what is missing, write and print the results; the status, and whether all is well."""
     from kemba import sweep as room
+    from kemba.stopwatch import Stage
+    from kemba_cli.progress import SWEEP, Progress
 
     say(f"results in {folder}")
     cases = room.expand(asked, document, folder)
+    every = {case.key for case in cases}
     missing = {case.key for case in cases if case.record(folder) is None}
+    if len(missing) < len(every):
+        say(f"{len(every) - len(missing)} of {len(every)} cases are done already")
+    waiting = iter(range(1, len(missing) + 1))
     status, records = "interrupted", {}
+
+    def begun() -> None:
+        if number := next(waiting, 0):
+            progress.tell(Stage("case", number, len(missing)))
+
+    def ended(case: Any, record: dict[str, Any]) -> None:
+        if not record["good"]:
+            progress.remark(f"{case.block} {case.index}: {record['sentence']}")
+        begun()
+
     try:
-        with Bar(len(missing), len({case.key for case in cases})) as bar:
+        with Progress(SWEEP) as progress:
+            begun()
             left = None if due is None else max(0.1, due - time.monotonic())
-            records = room.run_cases(cases, folder, scheduler, jobs, left, bar.tell)
+            records = room.run_cases(cases, folder, scheduler, jobs, left, ended)
         done = all(case.key in records for case in cases)
         status = "finished" if done else "limit"
     finally:
@@ -112,41 +126,3 @@ def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) ->
         apex, landed = (np.array([r[key] for r in flown]) for key in ("apex_m", "good"))
         planned = flown[0]["apex_m"] - flown[0]["apex_error_m"]
         save_figure(plot_robustness(apex, landed, ranks, planned), folder / f"{name}.png")
-
-
-class Bar:
-    """Progress over cases: a bar where someone watches, a line now and then elsewhere."""
-
-    def __init__(self, missing: int, total: int) -> None:
-        self.done, self.total = total - missing, total
-        self.began = self.told = time.monotonic()
-        self.bar: Any = None
-
-    def __enter__(self) -> Bar:
-        if self.done:
-            say(f"{self.done} of {self.total} cases are done already")
-        if not manner.get().silent and talk().is_terminal:
-            from rich.progress import Progress, TimeRemainingColumn
-
-            columns = [*Progress.get_default_columns()[:-1], TimeRemainingColumn()]
-            self.bar = Progress(*columns, console=talk())
-            self.bar.start()
-            self.task = self.bar.add_task("cases", total=self.total, completed=self.done)
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if self.bar is not None:
-            with suppress(KeyboardInterrupt):
-                self.bar.stop()
-
-    def tell(self, case: Any, record: dict[str, Any]) -> None:
-        """A case has ended."""
-        self.done += 1
-        last = f"{case.block} {case.index}: {record['sentence']}"
-        if self.bar is not None:
-            self.bar.update(self.task, completed=self.done)
-            if not record["good"]:
-                self.bar.console.print(last, markup=False)
-        elif not record["good"] or time.monotonic() > self.told + EVERY or self.done == self.total:
-            self.told = time.monotonic()
-            say(f"{self.told - self.began:6.1f} s  {self.done}/{self.total}  {last}")
