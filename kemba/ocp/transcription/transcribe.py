@@ -72,12 +72,10 @@ RequirementBlock = tuple[RowBlock, StageRows, list[int]]  # with the nodes at wh
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a row of the program says: kind, label, node, and the size of a violation."""
+    """What a row of the program says: kind, label, node."""
 
     kind: str
     label: str
-    unit: str
-    scale: float
     node: int
 
 
@@ -184,7 +182,7 @@ class Transcription:
                 g, stage.y, self.layout, self.held
             ):
                 continue
-            rows = StageRows(row.kind, g, 0.0, INF, (row.label,), (row.unit,), (row.scale,))
+            rows = StageRows(row.kind, g, 0.0, INF, [row.label])
             at = index[[0], : self.layout.size]
             blocks.append((RowBlock(stage.y, rows.g, ca.SX(0), at), rows, [0]))
         return blocks
@@ -193,7 +191,7 @@ class Transcription:
         """The cost of quantities that are to be as large or as small as possible."""
         if not any(r.aim for r in self.requirements):
             return []
-        nothing = StageRows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
+        nothing = StageRows("requirement", ca.SX(0, 1), 0.0, 0.0, [])
         found: list[RequirementBlock] = []
         for requirement, g, where in self.requirement_expressions():
             if requirement.aim:
@@ -277,10 +275,7 @@ class Transcription:
 
 
 def _meanings(rows: StageRows, node: int) -> list[Meaning]:
-    return [
-        Meaning(rows.kind, label, unit, scale, node)
-        for label, unit, scale in zip(rows.labels, rows.units, rows.scales, strict=True)
-    ]
+    return [Meaning(rows.kind, label, node) for label in rows.labels]
 
 
 SPEED = SCALES["m.s-1"]
@@ -307,6 +302,4 @@ def approach_rows(
         own = felt(model.mechanism, constraint.label)
         rows.append(own * (rate + of_state(constraint.gap) / step) / SPEED)
         labels.append(f"landing.impact_speed:{constraint.label}")
-    units, scales = ("m.s-1",) * len(rows), (SPEED,) * len(rows)
-    low = -speed / SPEED
-    return StageRows("requirement", ca.vertcat(*rows), low, INF, tuple(labels), units, scales)
+    return StageRows("requirement", ca.vertcat(*rows), -speed / SPEED, INF, labels)
