@@ -69,6 +69,21 @@ def _load_effects(files: list[Path] | None) -> list[Path] | None:
 
 Foreign = Annotated[str | None, typer.Option("--map", help="Column map YAML for foreign logs.")]
 Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
+Logs = Annotated[
+    list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
+]
+HeldOut = Annotated[
+    list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
+]
+Written = Annotated[
+    Path | None, typer.Argument(help="Run folder, as solve writes it (the newest).")
+]
+Executed = Annotated[Path | None, typer.Option(help="Run folder that was executed.")]
+NewRun = Annotated[Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
+]
+Show = Annotated[bool, typer.Option("--show", help="Open it in the browser.")]
 OwnEffects = Annotated[
     list[Path] | None,
     typer.Option(
@@ -141,6 +156,13 @@ def print_json(data: Any) -> None:
     from kemba.files import plain
 
     sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
+
+
+def open_page(path: Path) -> None:
+    """Open a page that was written in the browser."""
+    import webbrowser
+
+    webbrowser.open(path.resolve().as_uri())
 
 
 def usual(verb: Callable[..., None]) -> Callable[..., None]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, manner, put_json, results, say
+from kemba_cli.common import Executed, Force, Foreign, Logs, manner, put_json, results, say
 
 if TYPE_CHECKING:
     from kemba.identify.compare.compare import Comparison
@@ -17,11 +17,9 @@ SHOWN = 5
 
 
 def compare(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
-    ],
+    logs: Logs,
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
-    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    run: Executed = None,
     figure: Annotated[
         bool | None,
         typer.Option(

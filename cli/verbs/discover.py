@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, put_json, say
+from kemba_cli.common import Force, Foreign, HeldOut, Logs, put_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -19,12 +19,8 @@ WRITTEN = ("answer.json", "model.yaml", "model_*.yaml", "experiment.yaml", "*.pn
 
 
 def discover(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
-    ],
-    holdout: Annotated[
-        list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
-    ] = None,
+    logs: Logs,
+    holdout: HeldOut = None,
     model: Annotated[str, typer.Option(help="Model YAML that may lack an effect.")] = "planning",
     out: Annotated[
         Path | None,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, newest, put, say
+from kemba_cli.common import Force, Foreign, HeldOut, NewRun, Set, newest, put, say
 
 
 def learn(
@@ -20,15 +20,9 @@ def learn(
     target: Annotated[
         str | None, typer.Option(help="Task YAML to plan next; else that of the last run.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
-    ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
-    ] = None,
-    holdout: Annotated[
-        list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
-    ] = None,
+    out: NewRun = None,
+    overrides: Set = None,
+    holdout: HeldOut = None,
     column_map: Foreign = None,
     time_limit: Annotated[
         float, typer.Option(min=5.0, help="Seconds at most; half of them for discovery.")

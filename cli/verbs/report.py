@@ -5,13 +5,11 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, newest, put
+from kemba_cli.common import Force, Written, newest, put
 
 
 def report(
-    run: Annotated[
-        Path | None, typer.Argument(help="Run folder, as solve writes it (the newest).")
-    ] = None,
+    run: Written = None,
     out: Annotated[
         Path | None, typer.Option(help="HTML to write (a new report.html in RUN).")
     ] = None,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, newest, put, say
+from kemba_cli.common import Executed, Force, Foreign, Show, newest, open_page, put, say
 from kemba_cli.failures import BAD_ANSWER
 
 
@@ -14,7 +14,7 @@ def review(
         list[Path] | None,
         typer.Argument(help="Logs of one machine, or folders of logs, a run, an answer."),
     ] = None,
-    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    run: Executed = None,
     answer: Annotated[Path | None, typer.Option(help="Folder that discover wrote.")] = None,
     model: Annotated[
         str | None, typer.Option(help="Model YAML to judge, not the run's own.")
@@ -23,7 +23,7 @@ def review(
         Path | None, typer.Option(help="HTML to write (a new review.html beside the logs).")
     ] = None,
     column_map: Foreign = None,
-    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    show: Show = False,
     force: Force = False,
 ) -> None:
     """Write one page about a jump: the verdict, plan and logs over each other, what is missing.
@@ -48,9 +48,7 @@ def review(
     put({"review": str(page), **verdict.json()}, page)
     say_verdict(verdict)
     if show:
-        import webbrowser
-
-        webbrowser.open(page.resolve().as_uri())
+        open_page(page)
     if verdict.grade == "bad":
         raise typer.Exit(BAD_ANSWER)
 

@@ -7,25 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, put, say, warn
+from kemba_cli.common import Force, NewRun, Set, put, say, warn
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
     from kemba.trajectory import Trajectory
 
 
-Set = Annotated[
-    list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
-]
-
-
 def solve(
     task: Annotated[
         str | None, typer.Argument(help="Task YAML, here or among the shipped ones.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
-    ] = None,
+    out: NewRun = None,
     overrides: Set = None,
     model: Annotated[str | None, typer.Option(help="Model YAML instead of the task's.")] = None,
     resume: Annotated[

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, newest, put
+from kemba_cli.common import Force, Foreign, Show, newest, open_page, put
 
 
 def view(
@@ -25,7 +25,7 @@ def view(
         Path | None, typer.Option(help="Recording (.rrd) for the Rerun viewer to write instead.")
     ] = None,
     column_map: Foreign = None,
-    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    show: Show = False,
     force: Force = False,
 ) -> None:
     """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play, or for Rerun.
@@ -38,6 +38,4 @@ def view(
     path = view_run(shown, out, *how) if rerun is None else record_run(shown, rerun, *how)
     put({"view": str(path)}, path)
     if show and rerun is None:
-        import webbrowser
-
-        webbrowser.open(path.resolve().as_uri())
+        open_page(path)
