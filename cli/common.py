@@ -7,8 +7,10 @@ import inspect
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,12 +21,39 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 
-effect_files: ContextVar[tuple[Path, ...]] = ContextVar("effect_files", default=())
+@dataclass(frozen=True)
+class Manner:
+    """How a verb speaks: by one JSON object, with nothing but the result, with more than usual;
+    `effects`: the files of the user's own effects. Who reads JSON is a program, to which nothing
+    else is said unless more is asked for."""
+
+    json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+    effects: Sequence[Path] = ()
+
+    @property
+    def silent(self) -> bool:
+        """Whether nothing but the result is said."""
+        return self.quiet or (self.json and not self.verbose)
+
+
+USUALLY = Manner()
+manner: ContextVar[Manner] = ContextVar("manner", default=USUALLY)
+
+
+@contextmanager
+def speaking(**how: Any) -> Iterator[None]:
+    """Within the block verbs speak like this; see `Manner`."""
+    before = manner.set(Manner(**how))
+    try:
+        yield
+    finally:
+        manner.reset(before)
 
 
 def _load_effects(files: list[Path] | None) -> list[Path] | None:
     """Add the effects of the user's files, before the verb reads any YAML."""
-    effect_files.set(tuple(files or ()))
     if files:
         from kemba.effects import BY_KIND
         from kemba.errors import KembaError
@@ -38,6 +67,23 @@ def _load_effects(files: list[Path] | None) -> list[Path] | None:
     return files
 
 
+Foreign = Annotated[str | None, typer.Option("--map", help="Column map YAML for foreign logs.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
+Logs = Annotated[
+    list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
+]
+HeldOut = Annotated[
+    list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
+]
+Written = Annotated[
+    Path | None, typer.Argument(help="Run folder, as solve writes it (the newest).")
+]
+Executed = Annotated[Path | None, typer.Option(help="Run folder that was executed.")]
+NewRun = Annotated[Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
+]
+Show = Annotated[bool, typer.Option("--show", help="Open it in the browser.")]
 OwnEffects = Annotated[
     list[Path] | None,
     typer.Option(
@@ -46,14 +92,13 @@ OwnEffects = Annotated[
         help="Python file with effects of your own (its code is run); may be repeated.",
     ),
 ]
-Foreign = Annotated[str | None, typer.Option("--map", help="Column map YAML for foreign logs.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace results that are there already.")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the result.")]
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Say more: iterations, time taken, tracebacks.")
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the result.")]
-loud: ContextVar[bool] = ContextVar("loud", default=False)  # whether `-v` was given
+# options of every verb, by the fields of `Manner`
+USUAL = {"effects": OwnEffects, "json": Json, "quiet": Quiet, "verbose": Verbose}
 
 
 @lru_cache(maxsize=1)
@@ -72,46 +117,77 @@ def talk() -> Console:
     return Console(stderr=True, highlight=False)
 
 
-def say(text: str, quiet: bool = False) -> None:
-    """A remark on stderr, as it is: `[N.m]` is a unit, not markup."""
-    if not quiet:
+def say(text: str, always: bool = False) -> None:
+    """A remark on stderr, as it is: `[N.m]` is a unit, not markup. `always`: whatever was asked."""
+    if always or not manner.get().silent:
         typer.echo(text, err=True)
 
 
-def newest(quiet: bool, holds: str = "trajectory.csv") -> Path:
+def warn(text: str) -> None:
+    """What a program should hear of, too: on stderr beside JSON, but not with `-q`."""
+    say(text, always=not manner.get().quiet)
+
+
+def newest(holds: str = "trajectory.csv") -> Path:
     """The newest run here that has the file `holds`; says which. Raises KembaError."""
     from kemba.runs import newest_run
 
     run = newest_run(holds)
-    say(f"the newest run: {run}", quiet)
+    say(f"the newest run: {run}")
     return run
 
 
+def put_json(data: Any) -> bool:
+    """Whether the answer is to be JSON; then it is printed, NaN as null."""
+    if not manner.get().json:
+        return False
+    print_json(data)
+    return True
+
+
+def put(data: Any, text: object) -> None:
+    """The answer on stdout: as JSON where that was asked for, else the text."""
+    if not put_json(data):
+        typer.echo(text)
+
+
 def print_json(data: Any) -> None:
-    """The one JSON object of `--json` on stdout; NaN becomes null."""
+    """One JSON object on stdout; NaN becomes null."""
     from kemba.files import plain
 
     sys.stdout.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
 
 
-def with_verbose(verb: Callable[..., None]) -> Callable[..., None]:
-    """The verb with `-v` as one option more, for typer to find in its signature."""
+def open_page(path: Path) -> None:
+    """Open a page that was written in the browser."""
+    import webbrowser
+
+    webbrowser.open(path.resolve().as_uri())
+
+
+def usual(verb: Callable[..., None]) -> Callable[..., None]:
+    """The verb with the options of all verbs, for typer to find in its signature."""
 
     @functools.wraps(verb)
-    def run(*args: Any, verbose: bool = False, **options: Any) -> None:
-        before = loud.set(verbose)
+    def run(*args: Any, **options: Any) -> None:
+        asked = {
+            name: options.pop(name, None) or usually for name, usually in vars(USUALLY).items()
+        }
         began, worked = time.monotonic(), time.process_time()
-        try:
-            verb(*args, **options)
-        finally:
-            loud.reset(before)
-            if verbose:
-                took, cpu = time.monotonic() - began, time.process_time() - worked
-                say(f"took {took:.1f} s, {cpu:.1f} s of it computing", options.get("quiet", False))
+        with speaking(**asked):
+            try:
+                verb(*args, **options)
+            finally:
+                if asked["verbose"]:
+                    took, cpu = time.monotonic() - began, time.process_time() - worked
+                    say(f"took {took:.1f} s, {cpu:.1f} s of it computing")
 
-    signature = inspect.signature(verb, eval_str=True)
-    added = inspect.Parameter("verbose", inspect.Parameter.KEYWORD_ONLY, default=False)
-    listed = [*signature.parameters.values(), added.replace(annotation=Verbose)]
-    run.__signature__ = signature.replace(parameters=listed)  # type: ignore[attr-defined]
-    run.__annotations__ = {**verb.__annotations__, "verbose": Verbose}
+    signature, kind = inspect.signature(verb, eval_str=True), inspect.Parameter.KEYWORD_ONLY
+    added = [
+        inspect.Parameter(name, kind, annotation=option, default=getattr(USUALLY, name))
+        for name, option in USUAL.items()
+    ]
+    parameters = [*signature.parameters.values(), *added]
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {**verb.__annotations__, **USUAL}
     return run

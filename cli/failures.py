@@ -12,7 +12,7 @@ from typing import Any
 import typer
 
 from kemba.errors import KembaError
-from kemba_cli.common import loud
+from kemba_cli.common import manner
 
 NEEDED = 1_000_000_000  # B of address space; the largest verb, `solve`, took 0.86e9 with one thread
 PER_THREAD = 200_000_000  # B; each further thread of linear algebra took 0.18e9
@@ -110,7 +110,7 @@ def _told(error: BaseException) -> tuple[str, int]:
 def _crash(error: BaseException) -> str:
     """The message on an unexpected exception: short, or the traceback with KEMBA_DEBUG."""
     whole = "".join(traceback.format_exception(error))
-    if os.environ.get("KEMBA_DEBUG") or loud.get():
+    if os.environ.get("KEMBA_DEBUG") or manner.get().verbose:
         return whole
     try:
         with tempfile.NamedTemporaryFile(

@@ -12,9 +12,9 @@ from typing import Annotated
 import typer
 
 import kemba
-from kemba_cli.common import with_verbose
+from kemba_cli.common import usual
 from kemba_cli.failures import guarded
-from kemba_cli.usage import Command, figure_at, is_new_folder, is_picture
+from kemba_cli.usage import Command, Comparing
 from kemba_cli.verbs.adopt import adopt
 from kemba_cli.verbs.characterise import characterise
 from kemba_cli.verbs.check import check
@@ -50,11 +50,6 @@ PANELS = {  # as --help groups them
     ),
     "Catalogue and files": (effects, schema),
 }
-# verbs whose `--figure` took a place before it was the switch that it is at all verbs
-PLACED = {
-    compare: figure_at("--out", is_picture),
-    characterise: figure_at("--figures", is_new_folder),
-}
 VERBS = tuple(verb for verbs in PANELS.values() for verb in verbs if verb is not draft_map)
 
 app = typer.Typer(
@@ -65,8 +60,8 @@ app = typer.Typer(
 for panel, verbs in PANELS.items():
     for verb in verbs:
         name = "map" if verb is draft_map else verb.__name__  # `map` is a word of Python
-        shape = PLACED.get(verb, Command)
-        app.command(name, cls=shape, rich_help_panel=panel)(with_verbose(guarded(verb)))
+        shape = Comparing if verb is compare else Command
+        app.command(name, cls=shape, rich_help_panel=panel)(usual(guarded(verb)))
 
 
 def _version(wanted: bool) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kemba_cli.common import effect_files, say
+from kemba_cli.common import manner, say
 
 if TYPE_CHECKING:
     from kemba.report.verdict import ReviewVerdict
@@ -29,24 +29,24 @@ LAST = {  # verbs that end the way, and why
 Log = str | Path
 
 
-def say_next(words: str, quiet: bool) -> None:
+def say_next(words: str) -> None:
     """`next: kemba-opt ...` on stderr, with the user's own effects; nothing for no words."""
     if words:
-        say(f"next: kemba-opt {words}{_own()}", quiet)
+        say(f"next: kemba-opt {words}{_own()}")
 
 
-def say_verdict(verdict: ReviewVerdict, quiet: bool) -> None:
+def say_verdict(verdict: ReviewVerdict) -> None:
     """The verdict of a page, what speaks against it, and what to do next."""
-    say(verdict.sentence, quiet)
+    say(verdict.sentence)
     if verdict.doubt:
-        say(f"but: {verdict.doubt}")
+        say(f"but: {verdict.doubt}", always=True)
     command = verdict.command and f"{verdict.command}{_own()}"
-    say(f"next: {verdict.next} {command}".rstrip(), quiet)
+    say(f"next: {verdict.next} {command}".rstrip())
 
 
 def _own() -> str:
     """The files of the user's own effects, as they are typed."""
-    return "".join(f" --effects {shlex.quote(str(file))}" for file in effect_files.get())
+    return "".join(f" --effects {shlex.quote(str(file))}" for file in manner.get().effects)
 
 
 def after_solve(run: str, good: bool, status: str = "") -> str:

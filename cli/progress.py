@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kemba.stopwatch import Stage
-from kemba_cli.common import loud, say, talk
+from kemba_cli.common import manner, say, talk
 
 EARLY = 0.08  # share of the work before which nothing can be said of the rest
 SOON = 1.0  # s, before which nothing can be said either
@@ -71,6 +71,7 @@ LEARN: Course = {
 }
 REVIEW: Course = {**within(COMPARE, 0.0, 0.9), "drawing": 0.9}
 SIMULATE: Course = {"executing": 0.0}
+SWEEP: Course = {"case": 0.0}
 EXPERIMENT: Course = {"judging the standard": 0.0, "fitting the rivals": 0.8, "planning": 0.8}
 SENSITIVITY: Course = {"the same commands": 0.02, "the plan made anew": 0.35}
 
@@ -159,8 +160,8 @@ class Progress:
     `course`: how far the work is when a stage begins. `limit`: seconds that it takes at most.
     """
 
-    def __init__(self, quiet: bool, course: Course, limit: float | None = None) -> None:
-        self.quiet, self.live = quiet, not quiet and talk().is_terminal
+    def __init__(self, course: Course, limit: float | None = None) -> None:
+        self.live = not manner.get().silent and talk().is_terminal
         self.started = time.monotonic()
         self.left = Left(course, limit)
         self.stage = self.alike = ""
@@ -187,14 +188,21 @@ class Progress:
         else:
             self._line(stage)
 
+    def remark(self, text: str) -> None:
+        """A line that stays, above the bar where there is one."""
+        if self.live:
+            self.bar.console.print(text, markup=False)
+        else:
+            say(text)
+
     def watch(self, iteration: int, objective: float, violation: float) -> None:
         """An iteration of the current stage."""
         if self.live and iteration % 5 == 0:
             numbers = f"iteration {iteration}, violation {violation:.0e}"
             self.bar.update(self.task, description=f"{self.stage}: {numbers}")
-        elif loud.get() and iteration % EVERY == 0:
+        elif manner.get().verbose and iteration % EVERY == 0:
             numbers = f"objective {objective:.3g}, violation {violation:.1e}"
-            say(f"          iteration {iteration}, {numbers}", self.quiet)
+            say(f"          iteration {iteration}, {numbers}")
 
     def _line(self, stage: str) -> None:
         """One line for a stage; of stages that are alike not all."""
@@ -203,7 +211,7 @@ class Progress:
             return
         self.alike, self.told = alike, now
         left = f", {self.left.words}" if self.left.words else ""
-        say(f"{now - self.started:6.1f} s  {stage}{left}", self.quiet)
+        say(f"{now - self.started:6.1f} s  {stage}{left}")
 
 
 def bar(left: Left) -> Any:

@@ -1,7 +1,6 @@
 """Usage: examples beside complaints, and forms of options that scripts still write."""
 
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,44 +31,20 @@ class Command(TyperCommand):
 TABLES = (".csv", ".parquet", ".mcap", ".mat", ".npz", ".json")  # endings of logs
 
 
-def figure_at(place: str, fits: Callable[[str], bool]) -> type[Command]:
-    """A command that reads `--figure PLACE` as the option `place` with that value.
+class Comparing(Command):
+    """A command that reads `--figure FILE`, which scripts still write, as `--out FILE`."""
 
-    `fits`: whether the word behind `--figure` is a place, and not the next argument.
-    """
-
-    class Placed(Command):
-        def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-            return super().parse_args(ctx, _moved(args, place, fits))
-
-    return Placed
-
-
-def _moved(args: list[str], place: str, fits: Callable[[str], bool]) -> list[str]:
-    """The words of a command line with `--figure PLACE` and `--figure=PLACE` replaced."""
-    found: list[str] = []
-    for number, word in enumerate(args):
-        name, is_set, value = word.partition("=")
-        after = args[number + 1] if number + 1 < len(args) else "-"
-        if name == "--figure" and is_set:
-            found += [place, value]
-        elif word == "--figure" and not after.startswith("-") and fits(after):
-            found.append(place)  # the value follows by itself
-        else:
-            found.append(word)
-    return found
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        found: list[str] = []
+        for word, after in zip(args, [*args, "-"][1:], strict=True):
+            if word.startswith("--figure="):
+                found += ["--out", word.partition("=")[2]]
+            else:
+                found.append("--out" if word == "--figure" and is_picture(after) else word)
+        return super().parse_args(ctx, found)
 
 
 def is_picture(word: str) -> bool:
-    """Whether a word behind `compare --figure` is the picture's name, not a log."""
+    """Whether a word behind `--figure` is the picture's name, not a log or an option."""
     path = Path(word)
-    return path.suffix.lower() not in TABLES and not path.is_dir()
-
-
-def is_new_folder(word: str) -> bool:
-    """Whether a word behind `characterise --figure` is a folder for pictures, not logs."""
-    path = Path(word)
-    return path.suffix.lower() not in TABLES and not [
-        *path.glob("*.csv"),
-        *path.glob("metadata.yaml"),
-    ]
+    return not (word.startswith("-") or path.suffix.lower() in TABLES or path.is_dir())

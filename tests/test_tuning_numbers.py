@@ -21,7 +21,6 @@ CONSTANTS = {  # file -> names, why
         "constants of air; the critical pressure ratio; smoothing",
     ),
     "effects/pneumatics/chamber.py": ("OF_A_KIND ENTRY", "tolerances of an effect's figures"),
-    "effects/pneumatics/damping.py": ("NONE", "tolerances of an effect's figures"),
     "effects/pneumatics/switching.py": ("ON", "what a valve takes for a command"),
     "effects/pneumatics/valve.py": ("EARLIEST", "nothing switches before its command"),
     "effects/mechanics/boom.py": ("V_BOOM W_PITCH", "smoothing widths of formulas"),

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, put
 from kemba_cli.failures import BAD_ANSWER
 
 
@@ -22,9 +22,6 @@ def adopt(
         bool, typer.Option("--only-sure", help="Without effects that are only likely.")
     ] = False,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a model YAML with what an answer found, or with a chosen effect of its ranking.
 
@@ -49,6 +46,6 @@ def adopt(
     added = adopt_answer(answer, path, only_sure) if effect is None else effect
     if effect is not None:
         adopt_effect(answer, effect, path)
-    print_json({"model": str(path), "added": added}) if json else typer.echo(path)
+    put({"model": str(path), "added": added}, path)
     rig = bool(load_model(path, rig=True).mechanism.rig)
-    say_next(after_model(path, rig), quiet or json)
+    say_next(after_model(path, rig))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, results, say
+from kemba_cli.common import Force, Foreign, put_json, results, say
 
 if TYPE_CHECKING:
     from kemba.plant.characterise import Characteristics
@@ -43,9 +43,6 @@ def characterise(
         ),
     ] = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Fit air and friction of a cylinder to bench logs, and write them as a model.
 
@@ -62,7 +59,7 @@ def characterise(
         if figure or figures or supply:
             what = "figures are drawn, and supplies told, of the paper's rigs only"
             raise typer.BadParameter(what, param_hint="--supply" if supply else "--figure")
-        _own_rig(logs, model, out, force, json, quiet, column_map)
+        _own_rig(logs, model, out, force, column_map)
         return
     from kemba.identify.logs.gate import BadData, sentence
     from kemba.identify.logs.reading import read_logs
@@ -94,18 +91,16 @@ def characterise(
     if out:
         found.write_model(out, out.stem)
     drawn = _draw(found, read, folder, model) if folder else []
-    answer: dict[str, Any] = {"logs": len(read), **as_json(found), "model": out and str(out)}
-    answer["figures"] = drawn
-    if json:
-        print_json(answer)
+    facts = {"logs": len(read), **as_json(found), "model": out and str(out), "figures": drawn}
+    if put_json(facts):
         return
     _print(found)
     for remark in found.remarks:
-        say(remark)
+        say(remark, always=True)
     for path in drawn:
-        say(f"wrote {path}", quiet)
-    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
-    say_next(after_model(out) if out else "", quiet)
+        say(f"wrote {path}")
+    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml")
+    say_next(after_model(out) if out else "")
 
 
 def _folder(figure: bool | None, figures: Path | None, model: Path | None) -> Path | None:
@@ -124,8 +119,6 @@ def _own_rig(
     model: str,
     out: Path | None,
     force: bool,
-    json: bool,
-    quiet: bool,
     column_map: Path | None,
 ) -> None:
     """The figures of a rig of the user's own, and of the effects that its model lists."""
@@ -141,8 +134,7 @@ def _own_rig(
     found = characterise_logs(logs, model, column_map)
     if out:
         found.write_model(out, reference(model))
-    if json:
-        print_json({"logs": len(logs), **found.json(), "model": out and str(out)})
+    if put_json({"logs": len(logs), **found.json(), "model": out and str(out)}):
         return
     table = Table("figure", "given", "fitted", "95 %", "unit", box=None)
     for f in found.figures:
@@ -152,9 +144,9 @@ def _own_rig(
     error = f"{found.error_before:.3g} to {found.error_after:.3g} times the noise of the sensors"
     typer.echo(f"The error falls from {error}. Intervals are those of one mounting.")
     for name in found.apart:
-        say(f"{name} differs between runs; its interval spans them", quiet)
-    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml", quiet)
-    say_next(after_model(out, True, logs, column_map) if out else "", quiet)
+        say(f"{name} differs between runs; its interval spans them")
+    say(f"wrote {out}" if out else "write a model with --out MODEL.yaml")
+    say_next(after_model(out, True, logs, column_map) if out else "")
 
 
 def _draw(

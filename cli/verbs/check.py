@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Foreign, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Foreign, put_json
 from kemba_cli.failures import BAD_INPUT
 
 
@@ -15,9 +15,6 @@ def check(
     model: Annotated[
         str, typer.Option(help="Model YAML of the machine that the logs are from.")
     ] = "planning",
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Validate any YAML or log, with all mistakes at once.
 
@@ -37,15 +34,14 @@ def check(
             answers.append({"file": str(file), "good": True, **answer})
         except KembaError as error:
             answers.append({"file": str(file), "good": False, "sentence": str(error)})
-    _tell(answers, json)
+    _tell(answers)
     if not all(answer["good"] for answer in answers):
         raise typer.Exit(BAD_INPUT)
-    say_next(after_check(answers, column_map, model), quiet or json)
+    say_next(after_check(answers, column_map, model))
 
 
-def _tell(answers: list[dict[str, Any]], json: bool) -> None:
-    if json:
-        print_json({"files": answers})
+def _tell(answers: list[dict[str, Any]]) -> None:
+    json = put_json({"files": answers})
     for answer in answers:
         if not answer["good"]:
             typer.echo(answer["sentence"], err=True)

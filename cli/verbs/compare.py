@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, results, say
+from kemba_cli.common import Executed, Force, Foreign, Logs, manner, put_json, results, say
 
 if TYPE_CHECKING:
     from kemba.identify.compare.compare import Comparison
@@ -17,11 +17,9 @@ SHOWN = 5
 
 
 def compare(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
-    ],
+    logs: Logs,
     model: Annotated[str, typer.Option(help="Model YAML to judge.")] = "planning",
-    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    run: Executed = None,
     figure: Annotated[
         bool | None,
         typer.Option(
@@ -36,9 +34,6 @@ def compare(
     ] = False,
     column_map: Foreign = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Say whether a model explains logs to within their noise and, if not, where it fails.
 
@@ -56,7 +51,7 @@ def compare(
             other = "--run" if run else "--out" if out else "--figure"
             why = f"compares nothing, so that {other} has no use"
             raise typer.BadParameter(why, param_hint="--what-could-be-seen")
-        _preview(logs, model, column_map, json, quiet)
+        _preview(logs, model, column_map)
         return
     if out is not None and figure is False:
         raise typer.BadParameter("--out names the figure", param_hint="--no-figure")
@@ -66,26 +61,25 @@ def compare(
 
         path = place_for(out, Path("compare.png"), force, FORMATS)
     logs = log_files(logs)
-    with Progress(quiet or json, COMPARE) as progress:
+    with Progress(COMPARE) as progress:
         found, _ = compare_logs(logs, model, column_map, run, progress.tell)
     if path is not None:
         from kemba.plotting.comparison import plot_comparison
         from kemba.plotting.style import save_figure
 
         save_figure(plot_comparison(found), path)
-        say(f"wrote {path}", quiet)
-    if json:
-        print_json({**found.json(), **({"figure": str(path)} if path else {})})
+        say(f"wrote {path}")
+    if put_json({**found.json(), **({"figure": str(path)} if path else {})}):
         return
     typer.echo(found.sentence)
     for text in evidence_faults(model):
-        say(text, quiet)
-    if not quiet:
+        say(text)
+    if not manner.get().quiet:
         _print(found)
-    say_next(after_compare(logs, column_map, model, run, found.good or found.tolerable), quiet)
+    say_next(after_compare(logs, column_map, model, run, found.good or found.tolerable))
 
 
-def _preview(logs: list[Path], model: str, column_map: str | None, json: bool, quiet: bool) -> None:
+def _preview(logs: list[Path], model: str, column_map: str | None) -> None:
     """Which effects logs could show, and which standard tests would tell more."""
     from rich.table import Table
 
@@ -95,22 +89,21 @@ def _preview(logs: list[Path], model: str, column_map: str | None, json: bool, q
     from kemba_cli.progress import COMPARE, Progress
 
     logs = log_files(logs)
-    with Progress(quiet or json, COMPARE) as progress:
+    with Progress(COMPARE) as progress:
         found = preview(logs, model, column_map, progress.tell)
-    if json:
-        print_json(found.json())
+    if put_json(found.json()):
         return
     typer.echo(found.told.sentence)
     for test in found.tests:
         typer.echo(f"  {test.sentence}")
-    if not quiet:
+    if not manner.get().quiet:
         table = Table("effect", "smallest size that shows", "usual size", "unit")
         for effect, size in found.told.sizes.items():
             switch = found.switches[effect]
             shown = "at no size" if size is None else f"{size:.2g}"
             table.add_row(effect, shown, f"{switch.size:.2g}", switch.unit)
         results().print(table)
-    say_next(discover(logs, column_map, model), quiet)
+    say_next(discover(logs, column_map, model))
 
 
 def _print(found: Comparison) -> None:

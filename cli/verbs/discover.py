@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, Foreign, HeldOut, Logs, put_json, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -19,12 +19,8 @@ WRITTEN = ("answer.json", "model.yaml", "model_*.yaml", "experiment.yaml", "*.pn
 
 
 def discover(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Logs of one machine, or folders of logs, in any order.")
-    ],
-    holdout: Annotated[
-        list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
-    ] = None,
+    logs: Logs,
+    holdout: HeldOut = None,
     model: Annotated[str, typer.Option(help="Model YAML that may lack an effect.")] = "planning",
     out: Annotated[
         Path | None,
@@ -32,14 +28,8 @@ def discover(
     ] = None,
     column_map: Foreign = None,
     time_limit: Annotated[float, typer.Option(min=5.0, help="Seconds at most.")] = 300.0,
-    figures: Annotated[bool, typer.Option("--figure/--no-figure", help="Draw the figures.")] = True,
-    figure: Annotated[  # what the option was called before
-        bool, typer.Option("--figures/--no-figures", hidden=True, help="Earlier name of --figure.")
-    ] = True,
+    figure: Annotated[bool, typer.Option(help="Draw the figures.")] = True,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Find the physical effect that a model lacks, from logs of a robot or of a bench rig.
 
@@ -53,7 +43,7 @@ def discover(
 
     logs, holdout = log_files(logs), log_files(holdout or [])
     with claimed(out, "answer", "answer.json", force) as folder:
-        with Progress(quiet or json, DISCOVER, time_limit) as progress:
+        with Progress(DISCOVER, time_limit) as progress:
             answer, found = discover_logs(
                 logs, holdout, model, column_map, time_limit, progress.tell
             )
@@ -61,20 +51,19 @@ def discover(
             for old in (file for name in WRITTEN for file in folder.glob(name)):
                 old.unlink()
             write_answer(answer, folder, model)
-            if figures and figure and found is not None:
+            if figure and found is not None:
                 from kemba.plotting.studies import draw_discovery
 
                 draw_discovery(found, folder)
         finally:  # also when the disk is full: it took minutes
-            _tell(answer, folder, json, quiet)
-            say_next(after_discover(logs, column_map, model, folder), quiet or json)
+            _tell(answer, folder)
+            say_next(after_discover(logs, column_map, model, folder))
     if answer.verdict == "bad-data":
         raise typer.Exit(BAD_ANSWER)
 
 
-def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
-    if json:
-        print_json(answer.json())
+def _tell(answer: Answer, out: Path) -> None:
+    if put_json(answer.json()):
         return
     typer.echo(answer.sentence)
     if answer.ranking:
@@ -83,5 +72,5 @@ def _tell(answer: Answer, out: Path, json: bool, quiet: bool) -> None:
         values = ", ".join(f"{name} = {value}" for name, value in ranked.parameters.items())
         typer.echo(f"  {100 * ranked.probability:5.1f} %  {ranked.effect:28s} {values}")
     for remark in answer.remarks:
-        say(remark, quiet)
-    say(f"{out}", quiet)
+        say(remark)
+    say(f"{out}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, results
+from kemba_cli.common import manner, put, put_json, results
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -20,12 +20,9 @@ def effects(
         Path | None,
         typer.Option("--test", help="Python file: run the checks that every effect must pass."),
     ] = None,
-    own_effects: OwnEffects = None,
-    json: Json = False,
     markdown: Annotated[
         bool, typer.Option("--markdown", help="The catalogue as a page of the documentation.")
     ] = False,
-    quiet: Quiet = False,
 ) -> None:
     """Show the catalogue: equation, parameters with unit and size, source.
 
@@ -37,41 +34,37 @@ def effects(
     from kemba.effects.describe import chapters, describe, find_effect, page
 
     if test is not None:
-        _test(test, json, quiet)
+        _test(test)
         return
 
     if name:
         found = describe(find_effect(name))
-        print_json(found) if json else _detail(found)
+        put(found, _detail(found))
     elif markdown:
         typer.echo(page(), nl=False)
-    elif json:
-        print_json({"effects": [describe(e) for group in chapters().values() for e in group]})
-    else:
+    elif not put_json({"effects": [describe(e) for c in chapters().values() for e in c]}):
         for chapter, group in chapters().items():
             results().print(_table(chapter, [describe(effect) for effect in group]))
 
 
-def _test(file: Path, json: bool, quiet: bool) -> None:
+def _test(file: Path) -> None:
     """The checks of every effect in a file, one line each."""
     from kemba.contract import examine
     from kemba.effects import BY_KIND
 
-    results = []
+    how, results = manner.get(), []
     for effect in BY_KIND.load_file(file):
         for result in examine(effect):
             results.append(result)
-            if not json and not (quiet and result.good):
+            if not how.json and not (how.quiet and result.good):
                 told = "good" if result.good else f"FAILED: {result.sentence}"
                 typer.echo(f"{result.effect}: {result.check.name}: {told}")
     failed = [result for result in results if not result.good]
-    if json:
-        rows = [
-            {"effect": r.effect, "check": r.check.name, "good": r.good, "sentence": r.sentence}
-            for r in results
-        ]
-        print_json({"good": not failed, "checks": rows})
-    elif not failed:
+    rows = [
+        {"effect": r.effect, "check": r.check.name, "good": r.good, "sentence": r.sentence}
+        for r in results
+    ]
+    if not put_json({"good": not failed, "checks": rows}) and not failed:
         typer.echo(f"{file}: good: {len(results)} checks")
     if failed:
         raise typer.Exit(BAD_ANSWER)
@@ -92,7 +85,7 @@ def _table(title: str, rows: list[dict[str, Any]]) -> Table:
     return table
 
 
-def _detail(found: dict[str, Any]) -> None:
+def _detail(found: dict[str, Any]) -> str:
     from kemba.effects.describe import in_words
 
     ports = ", ".join(found["ports"]) or found["place"]
@@ -111,4 +104,4 @@ def _detail(found: dict[str, Any]) -> None:
     ]
     if found["replaces"]:
         lines.append(f"replaces    {', '.join(found['replaces'])}")
-    typer.echo("\n".join(lines))
+    return "\n".join(lines)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, put, say
 from kemba_cli.failures import BAD_ANSWER
 
 if TYPE_CHECKING:
@@ -36,9 +36,6 @@ def experiment(
         bool, typer.Option(help="On the robot: plan the motion at once, until it is certified.")
     ] = True,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Design the test that best tells the possible effects of an answer apart: a rig or task YAML.
 
@@ -53,20 +50,16 @@ def experiment(
 
     read_answer(answer)  # before a folder is made for the test
     path = fresh(out or answer / "experiment.yaml", force, endings=YAML)
-    with Progress(quiet or json, EXPERIMENT) as progress:
+    with Progress(EXPERIMENT) as progress:
         if on is Place.robot:
             facts = _on_robot(answer, path, certify, progress)
         else:
             facts = _on_rig(answer, path, progress)
-    if json:
-        print_json({"experiment": str(path), "on": on.value, **facts})
-    else:
-        typer.echo(path)
-        say(facts["sentence"], quiet)
-        say_next(facts["next"].removeprefix("kemba-opt "), quiet)
-        if not facts["next"]:
-            say(facts["why"], quiet)
+    put({"experiment": str(path), "on": on.value, **facts}, path)
+    say(facts["sentence"])
+    say_next(facts["next"].removeprefix("kemba-opt "))
     if not facts["next"]:
+        say(facts["why"])
         raise typer.Exit(BAD_ANSWER)
 
 

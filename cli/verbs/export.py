@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, put, say
 
 
 def export(
@@ -28,9 +28,6 @@ def export(
         bool, typer.Option("--nlp", help="Write the optimisation programs as CasADi functions.")
     ] = False,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a plan or a log in another format: PlotJuggler, Foxglove, MATLAB, pandas, own columns.
 
@@ -47,9 +44,9 @@ def export(
             raise typer.BadParameter("a map goes with logs and plans", param_hint="--map")
         paths = export_nlp(run, out or Path("nlp"), force)
         names = [str(path) for path in paths]
-        print_json({"export": names}) if json else typer.echo("\n".join(names))
+        put({"export": names}, "\n".join(names))
         version = casadi.CasadiMeta.version()
-        say(f"the functions are of CasADi {version}; older ones do not read them", quiet)
+        say(f"the functions are of CasADi {version}; older ones do not read them")
         return
     if out is None:
         raise typer.BadParameter("a file was expected, such as jump.mat", param_hint="--out")
@@ -60,4 +57,4 @@ def export(
     source = load_source(run, load_map(source_map) if source_map else None)
     fresh(out, force)
     path = write(source.trajectory, out, load_map(column_map) if column_map else None)
-    print_json({"export": str(path)}) if json else typer.echo(path)
+    put({"export": str(path)}, path)

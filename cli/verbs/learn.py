@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json, say
+from kemba_cli.common import Force, Foreign, HeldOut, NewRun, Set, newest, put, say
 
 
 def learn(
@@ -20,15 +20,9 @@ def learn(
     target: Annotated[
         str | None, typer.Option(help="Task YAML to plan next; else that of the last run.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
-    ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
-    ] = None,
-    holdout: Annotated[
-        list[Path] | None, typer.Option(help="A log kept for judging only; may be repeated.")
-    ] = None,
+    out: NewRun = None,
+    overrides: Set = None,
+    holdout: HeldOut = None,
     column_map: Foreign = None,
     time_limit: Annotated[
         float, typer.Option(min=5.0, help="Seconds at most; half of them for discovery.")
@@ -40,9 +34,6 @@ def learn(
         ),
     ] = True,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Learn from executed runs and plan the next one: compare, discover, adopt, plan, correct.
 
@@ -61,23 +52,20 @@ def learn(
     from kemba_cli.progress import LEARN, Progress
 
     folders, listed = _told_apart(runs or [], logs or [])
-    folders = folders or [newest(quiet or json, "controller.csv")]
-    listed = listed or _logs_of(folders[-1], quiet or json)
+    folders = folders or [newest("controller.csv")]
+    listed = listed or _logs_of(folders[-1])
     task = target or str(load_run(folders[-1]).task)
     asked = Asked(
         folders, listed, task, overrides or [], holdout or [], column_map, time_limit, correct
     )
-    with Progress(quiet or json, LEARN, time_limit) as progress:
+    with Progress(LEARN, time_limit) as progress:
         listener = Listener(progress.tell, progress.watch)
         found, folder = learn_into(asked, out, listener, force)
     page = write_learning(found, folder.path)
-    if json:
-        print_json(found.json())
-    else:
-        typer.echo(str(folder.path))
-        say(found.sentence, quiet and found.good)
-        say(f"{page}", quiet)
-        say_next(after_solve(str(folder.path), found.good), quiet)
+    put(found.json(), folder.path)
+    say(found.sentence, always=not found.good)
+    say(f"{page}")
+    say_next(after_solve(str(folder.path), found.good))
     if not found.good:
         raise typer.Exit(1)
 
@@ -97,7 +85,7 @@ def _told_apart(runs: list[Path], logs: list[Path]) -> tuple[list[Path], list[Pa
     return folders, listed
 
 
-def _logs_of(run: Path, quiet: bool) -> list[Path]:
+def _logs_of(run: Path) -> list[Path]:
     """The newest logs of a run; says which. Raises KembaError where it has none."""
     from kemba.errors import KembaError
     from kemba.runs import newest_logs
@@ -106,5 +94,5 @@ def _logs_of(run: Path, quiet: bool) -> list[Path]:
     if not found:
         hint = f"execute it: kemba-opt simulate {run} --repeat 3 --noise"
         raise KembaError(str(run), "has no logs", "its logs, or --logs, were expected", hint)
-    say(f"with its newest logs: {len(found)} in {found[0].parent}", quiet)
+    say(f"with its newest logs: {len(found)} in {found[0].parent}")
     return found

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, put, say, warn
 from kemba_cli.failures import BAD_ANSWER
 
 
@@ -14,9 +14,6 @@ def draft_map(
     out: Annotated[Path | None, typer.Option(help="Map to write (LOG_map.yaml here).")] = None,
     model: Annotated[str, typer.Option(help="Model YAML: its robot names the legs.")] = "planning",
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Draft a column map by guessing from names, units and ranges; say what is still missing.
 
@@ -35,24 +32,20 @@ def draft_map(
     found = draft(log, machine.legs, stroke, machine.rig, machine.logged)
     with atomic_text(out) as stream:
         stream.write(found.text(log.name))
-    answer = {"map": str(out), "kind": found.kind, "columns": found.columns}
-    if json:
-        more = {"missing": found.missing, "ignored": found.ignored}
-        print_json({**answer, **more, "questions": found.questions, "notes": found.notes})
-    else:
-        typer.echo(out)
+    told = ("kind", "columns", "missing", "ignored", "questions", "notes")
+    put({"map": str(out), **{name: getattr(found, name) for name in told}}, out)
     for note in found.notes:
-        say(note, quiet)
+        warn(note)
     for question in found.questions:
-        say(f"open: {question}", quiet)
+        warn(f"open: {question}")
     if found.missing:
         listed = ", ".join(f"'{header}'" for header in found.missing)
-        say(f"not found: {listed}. Add them to {out}; without them the log says too little.", quiet)
+        warn(f"not found: {listed}. Add them to {out}; without them the log says too little.")
         left = ", ".join(f"'{name}'" for name in found.ignored[:12])
-        say(f"not used: {left or 'no column is left'}", quiet)
+        warn(f"not used: {left or 'no column is left'}")
     if found.missing or found.questions:
         if found.questions:
-            say(f"answer what is open in {out}: correct its lines, then use it", quiet)
+            warn(f"answer what is open in {out}: correct its lines, then use it")
         raise typer.Exit(BAD_ANSWER)
-    say(f"look through {out}: signs and zeros of angles cannot be guessed", quiet)
-    say_next(after_map(log, out, model), quiet)
+    say(f"look through {out}: signs and zeros of angles cannot be guessed")
+    say_next(after_map(log, out, model))

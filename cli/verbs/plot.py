@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
+from kemba_cli.common import Force, Foreign, newest, put
 
 
 def plot(
@@ -31,9 +31,6 @@ def plot(
     ] = None,
     column_map: Foreign = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Draw body, joints, efforts, valves and contact, and a strip of stick figures.
 
@@ -51,7 +48,7 @@ def plot(
     for path, option, endings in ((out, "--out", FORMATS), (animate, "--animate", MOVIES)):
         if path is not None:
             fresh(path, force, option, endings)
-    runs = runs or [newest(quiet)]
+    runs = runs or [newest()]
     window = open_window() if show else None
     logs = bench_logs(runs[0]) if len(runs) == 1 else {}
     if logs and animate:
@@ -71,11 +68,7 @@ def plot(
         machine = machine_of(sources[0], model)
         written["animation"] = save_animation(sources[0], machine, animate)
     paths = {kind: str(path) for kind, path in written.items()}
-    if json:
-        print_json({**paths, "runs": names})
-    else:
-        for path in paths.values():
-            typer.echo(path)
-        say_next(after_plot(runs), quiet)
+    put({**paths, "runs": names}, "\n".join(paths.values()))
+    say_next(after_plot(runs))
     if show:
         show_windows()

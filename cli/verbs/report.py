@@ -5,20 +5,15 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json
+from kemba_cli.common import Force, Written, newest, put
 
 
 def report(
-    run: Annotated[
-        Path | None, typer.Argument(help="Run folder, as solve writes it (the newest).")
-    ] = None,
+    run: Written = None,
     out: Annotated[
         Path | None, typer.Option(help="HTML to write (a new report.html in RUN).")
     ] = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a run as one self-contained HTML page: verdict, numbers, motion, figures, origin.
 
@@ -27,10 +22,7 @@ def report(
     from kemba.report.review import report_run
     from kemba_cli.next_steps import say_verdict
 
-    run = run or newest(quiet, "certificate.json")
+    run = run or newest("certificate.json")
     path, verdict = report_run(run, out, force)
-    if json:
-        print_json({"report": str(path), **verdict.json()})
-    else:
-        typer.echo(path)
-        say_verdict(verdict, quiet)
+    put({"report": str(path), **verdict.json()}, path)
+    say_verdict(verdict)

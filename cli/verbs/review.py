@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json, say
+from kemba_cli.common import Executed, Force, Foreign, Show, newest, open_page, put, say
 from kemba_cli.failures import BAD_ANSWER
 
 
@@ -14,7 +14,7 @@ def review(
         list[Path] | None,
         typer.Argument(help="Logs of one machine, or folders of logs, a run, an answer."),
     ] = None,
-    run: Annotated[Path | None, typer.Option(help="Run folder that was executed.")] = None,
+    run: Executed = None,
     answer: Annotated[Path | None, typer.Option(help="Folder that discover wrote.")] = None,
     model: Annotated[
         str | None, typer.Option(help="Model YAML to judge, not the run's own.")
@@ -23,11 +23,8 @@ def review(
         Path | None, typer.Option(help="HTML to write (a new review.html beside the logs).")
     ] = None,
     column_map: Foreign = None,
-    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    show: Show = False,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write one page about a jump: the verdict, plan and logs over each other, what is missing.
 
@@ -42,21 +39,16 @@ def review(
 
     logs, run, answer = _told_apart(logs or [], run, answer)
     if not logs and run is None and answer is None:
-        run = newest(quiet, "certificate.json")
+        run = newest("certificate.json")
         logs = newest_logs(run)
         which = f"{len(logs)} in {logs[0].parent}" if logs else ""
-        say(f"with its newest logs: {which}" if logs else "it has no logs yet", quiet)
-    with Progress(quiet or json, REVIEW) as progress:
+        say(f"with its newest logs: {which}" if logs else "it has no logs yet")
+    with Progress(REVIEW) as progress:
         page, verdict = write(logs, run, answer, model, column_map, out, force, progress.tell)
-    if json:
-        print_json({"review": str(page), **verdict.json()})
-    else:
-        typer.echo(page)
-        say_verdict(verdict, quiet)
+    put({"review": str(page), **verdict.json()}, page)
+    say_verdict(verdict)
     if show:
-        import webbrowser
-
-        webbrowser.open(page.resolve().as_uri())
+        open_page(page)
     if verdict.grade == "bad":
         raise typer.Exit(BAD_ANSWER)
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json
+from kemba_cli.common import Force, print_json, put
 
 
 def schema(
@@ -14,9 +14,6 @@ def schema(
         Path | None, typer.Option(help="Write KIND.schema.json files into this folder.")
     ] = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """JSON Schema of the YAML files, so that editors complete and check them.
 
@@ -34,4 +31,4 @@ def schema(
     paths = {name: fresh(out / f"{name}.schema.json", force) for name in found}
     for name, content in found.items():
         write_json(paths[name], content)
-    print_json(paths) if json else typer.echo("\n".join(map(str, paths.values())))
+    put(paths, "\n".join(map(str, paths.values())))

@@ -5,13 +5,11 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
+from kemba_cli.common import Force, Written, newest, put, warn
 
 
 def sensitivity(
-    run: Annotated[
-        Path | None, typer.Argument(help="Run folder, as solve writes it (the newest).")
-    ] = None,
+    run: Written = None,
     out: Annotated[
         Path | None, typer.Option(help="CSV to write (a new sensitivity.csv in RUN).")
     ] = None,
@@ -19,9 +17,6 @@ def sensitivity(
         list[str] | None, typer.Option(help="A figure such as supply or contact.mu; else all.")
     ] = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write as CSV what small changes of height, supply, payload and every effect's numbers do.
 
@@ -35,11 +30,11 @@ def sensitivity(
     from kemba.sensitivity.table import sensitivity_of_run
     from kemba_cli.progress import SENSITIVITY, Progress
 
-    run = run or newest(quiet, "certificate.json")
+    run = run or newest("certificate.json")
     path = place_for(out, run / "sensitivity.csv", force)
-    with Progress(quiet or json, SENSITIVITY) as progress:
+    with Progress(SENSITIVITY) as progress:
         found = sensitivity_of_run(run, progress.tell, only or ())
     write_sensitivity(found, path)
     if found.unsolved:
-        say(f"no columns replanned/...: {found.unsolved}", quiet)
-    print_json({"sensitivity": str(path)}) if json else typer.echo(path)
+        warn(f"no columns replanned/...: {found.unsolved}")
+    put({"sensitivity": str(path)}, path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, newest, print_json, say
+from kemba_cli.common import Force, newest, put, say
 
 if TYPE_CHECKING:
     from kemba.plant.rigs import Rig
@@ -36,9 +36,6 @@ def simulate(
         Path | None, typer.Option(help="Folder for the logs (a new one in the run).")
     ] = None,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Execute a run's controller on the plant, as on hardware, and write logs.
 
@@ -48,7 +45,7 @@ def simulate(
     from kemba_cli.next_steps import after_simulate, say_next
     from kemba_cli.progress import SIMULATE, Progress
 
-    source = source or str(newest(quiet, "controller.csv"))
+    source = source or str(newest("controller.csv"))
     if Path(source).suffix in (".yaml", ".yml"):
         from kemba.plant.rigs import load_rig
 
@@ -57,16 +54,13 @@ def simulate(
             answer = _rig(rig, model or "plant", folder, seed, noise)
     else:
         default = (Path(source) if Path(source).is_dir() else Path(source).parent) / "logs"
-        progress = Progress(quiet or json, SIMULATE)
+        progress = Progress(SIMULATE)
         with claimed(out, default, "*.csv", force) as folder, progress:
             answer = _run(source, model, folder, seed, noise, repeat, policy, progress.tell)
-    if json:
-        print_json(answer)
-    else:
-        typer.echo("\n".join(answer["logs"] if "runs" in answer else [answer["folder"]]))
-        say(answer["sentence"], quiet)
-        run = Path(source) if Path(source).is_dir() else Path(source).parent
-        say_next(after_simulate(answer["logs"], run), quiet)
+    put(answer, "\n".join(answer["logs"] if "runs" in answer else [answer["folder"]]))
+    say(answer["sentence"])
+    run = Path(source) if Path(source).is_dir() else Path(source).parent
+    say_next(after_simulate(answer["logs"], run))
 
 
 def _run(

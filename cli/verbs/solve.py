@@ -7,25 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kemba_cli.common import Force, Json, OwnEffects, Quiet, print_json, say
+from kemba_cli.common import Force, NewRun, Set, put, say, warn
 
 if TYPE_CHECKING:
     from kemba.ocp import Task
     from kemba.trajectory import Trajectory
 
 
-Set = Annotated[
-    list[str] | None, typer.Option("--set", help="Override a key: --set 'height=0.6 m'.")
-]
-
-
 def solve(
     task: Annotated[
         str | None, typer.Argument(help="Task YAML, here or among the shipped ones.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="Run folder to write (a new runs/TASK-N).")
-    ] = None,
+    out: NewRun = None,
     overrides: Set = None,
     model: Annotated[str | None, typer.Option(help="Model YAML instead of the task's.")] = None,
     resume: Annotated[
@@ -62,9 +55,6 @@ def solve(
     replay: Annotated[bool, typer.Option(help="Execute the plan in simulation.")] = True,
     figure: Annotated[bool, typer.Option(help="Draw the plan.")] = True,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Plan a motion; write trajectory, controller table, certificate and figure to a run folder.
 
@@ -109,32 +99,29 @@ def solve(
         options.append(f"robust={robust}")
     resolved, document = load_task(task, options)
     if dry_run:
-        _dry_run(resolved, document, model, json)
+        _dry_run(resolved, document, model)
         return
     resolved = resolved.model_copy(update={"model": beside(model or resolved.model, Path())})
     built, _ = asked_of(resolved, document)
     if built.ignored:
-        say(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only", quiet)
+        warn(f"no plan can use {', '.join(built.ignored)}: it changes what is measured only")
     for remark in (*resolved.remarks, *built.remarks):
-        say(remark, quiet)
+        warn(remark)
     models = [path for name in (resolved.model, resolved.plant) for path in model_files(name)]
     inputs = [find_config(task, "tasks"), *dict.fromkeys(models), *BY_KIND.files]
     folder = RunFolder.create(out, resolved.name, inputs, force=force)
     if replay:
         load_meanwhile(*([DRAWING] if figure else []))
     with (
-        Progress(quiet or json, SOLVE) as progress,
-        Interrupt(lambda text: say(text, quiet)) as stop,
+        Progress(SOLVE) as progress,
+        Interrupt(warn) as stop,
     ):
         listener = Listener(progress.tell, progress.watch, stop)
         approach = Approach(start, starts, jobs, replay, origin, cold, memory)
         answer = solve_into(folder, resolved, document, listener, approach, figure)
-    if json:
-        print_json(answer)
-    else:
-        typer.echo(answer["run"])
-        say(answer["sentence"], quiet and answer["good"])  # why it failed is always said
-        say_next(after_solve(answer["run"], answer["good"], answer["status"]), quiet)
+    put(answer, answer["run"])
+    say(answer["sentence"], always=not answer["good"])  # why it failed is always said
+    say_next(after_solve(answer["run"], answer["good"], answer["status"]))
     if answer["status"] == "interrupted":
         raise typer.Exit(130)
     if not answer["good"]:
@@ -153,11 +140,9 @@ def _resumed(
     return task or str(found.task), out or (found.path if unfinished else None), start
 
 
-def _dry_run(task: Task, document: Any, model: str | None, json: bool) -> None:
+def _dry_run(task: Task, document: Any, model: str | None) -> None:
     from kemba.ocp.planning import program_size
 
     size = program_size(task, document, model)
-    if json:
-        print_json({"task": task.name, **size})
-    else:
-        typer.echo(f"{task.name}: {size['variables']} variables, {size['constraints']} constraints")
+    text = f"{task.name}: {size['variables']} variables, {size['constraints']} constraints"
+    put({"task": task.name, **size}, text)

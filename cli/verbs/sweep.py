@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from kemba_cli.common import Json, OwnEffects, Quiet, print_json, say, talk
-
-EVERY = 10.0  # s between lines where no one watches
+from kemba_cli.common import put, say
 
 
 def sweep(
@@ -32,9 +29,6 @@ def sweep(
         float | None, typer.Option(min=0.1, help="Seconds after which to stop.")
     ] = None,
     figure: Annotated[bool, typer.Option(help="Draw the executions of every block.")] = True,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Run many cases and show how many succeeded; the same command continues what was stopped.
 
@@ -52,8 +46,8 @@ def sweep(
     asked, document = room.load_sweep(file, list(overrides or []))
     with held(out or Path("sweeps") / asked.name) as folder:
         room.open_folder(folder, asked, document)
-        status, good = _run(folder, asked, document, scheduler, jobs, due, figure, json, quiet)
-    say_next(after_sweep(file, folder, status == "finished"), quiet or json)
+        status, good = _run(folder, asked, document, scheduler, jobs, due, figure)
+    say_next(after_sweep(file, folder, status == "finished"))
     if not good:
         raise typer.Exit(1)
 
@@ -66,20 +60,35 @@ def _run(
     jobs: int | None,
     due: float | None,
     figure: bool,
-    json: bool,
-    quiet: bool,
 ) -> tuple[str, bool]:
     """Do what is missing, write and print the results; the status, and whether all is well."""
     from kemba import sweep as room
+    from kemba.stopwatch import Stage
+    from kemba_cli.progress import SWEEP, Progress
 
-    say(f"results in {folder}", quiet or json)
+    say(f"results in {folder}")
     cases = room.expand(asked, document, folder)
+    every = {case.key for case in cases}
     missing = {case.key for case in cases if case.record(folder) is None}
+    if len(missing) < len(every):
+        say(f"{len(every) - len(missing)} of {len(every)} cases are done already")
+    waiting = iter(range(1, len(missing) + 1))
     status, records = "interrupted", {}
+
+    def begun() -> None:
+        if number := next(waiting, 0):
+            progress.tell(Stage("case", number, len(missing)))
+
+    def ended(case: Any, record: dict[str, Any]) -> None:
+        if not record["good"]:
+            progress.remark(f"{case.block} {case.index}: {record['sentence']}")
+        begun()
+
     try:
-        with Bar(len(missing), len({case.key for case in cases}), quiet or json) as bar:
+        with Progress(SWEEP) as progress:
+            begun()
             left = None if due is None else max(0.1, due - time.monotonic())
-            records = room.run_cases(cases, folder, scheduler, jobs, left, bar.tell)
+            records = room.run_cases(cases, folder, scheduler, jobs, left, ended)
         done = all(case.key in records for case in cases)
         status = "finished" if done else "limit"
     finally:
@@ -87,19 +96,15 @@ def _run(
         summary = room.write_results(folder, asked, cases, known, status)
     if figure:
         _figures(folder, cases, known, summary)
-    _answer(folder, status, summary, json)
+    _answer(folder, status, summary)
     return status, status == "finished" and bool(summary["good"])
 
 
-def _answer(folder: Path, status: str, summary: dict[str, Any], json: bool) -> None:
+def _answer(folder: Path, status: str, summary: dict[str, Any]) -> None:
     from kemba.sweep.results import sentence
 
-    if json:
-        print_json({"folder": folder, "status": status, **summary})
-        return
-    typer.echo(str(folder))
-    for name, block in summary["blocks"].items():
-        typer.echo(f"{name}: {sentence(block)}")
+    told = [f"{name}: {sentence(block)}" for name, block in summary["blocks"].items()]
+    put({"folder": folder, "status": status, **summary}, "\n".join([str(folder), *told]))
 
 
 def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) -> None:
@@ -121,41 +126,3 @@ def _figures(folder: Path, cases: Any, records: Any, summary: dict[str, Any]) ->
         apex, landed = (np.array([r[key] for r in flown]) for key in ("apex_m", "good"))
         planned = flown[0]["apex_m"] - flown[0]["apex_error_m"]
         save_figure(plot_robustness(apex, landed, ranks, planned), folder / f"{name}.png")
-
-
-class Bar:
-    """Progress over cases: a bar where someone watches, a line now and then elsewhere."""
-
-    def __init__(self, missing: int, total: int, quiet: bool) -> None:
-        self.done, self.total, self.quiet = total - missing, total, quiet
-        self.began = self.told = time.monotonic()
-        self.bar: Any = None
-
-    def __enter__(self) -> Bar:
-        if self.done:
-            say(f"{self.done} of {self.total} cases are done already", self.quiet)
-        if not self.quiet and talk().is_terminal:
-            from rich.progress import Progress, TimeRemainingColumn
-
-            columns = [*Progress.get_default_columns()[:-1], TimeRemainingColumn()]
-            self.bar = Progress(*columns, console=talk())
-            self.bar.start()
-            self.task = self.bar.add_task("cases", total=self.total, completed=self.done)
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        if self.bar is not None:
-            with suppress(KeyboardInterrupt):
-                self.bar.stop()
-
-    def tell(self, case: Any, record: dict[str, Any]) -> None:
-        """A case has ended."""
-        self.done += 1
-        last = f"{case.block} {case.index}: {record['sentence']}"
-        if self.bar is not None:
-            self.bar.update(self.task, completed=self.done)
-            if not record["good"]:
-                self.bar.console.print(last, markup=False)
-        elif not record["good"] or time.monotonic() > self.told + EVERY or self.done == self.total:
-            self.told = time.monotonic()
-            say(f"{self.told - self.began:6.1f} s  {self.done}/{self.total}  {last}", self.quiet)

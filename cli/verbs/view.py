@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from kemba_cli.common import Force, Foreign, Json, OwnEffects, Quiet, newest, print_json
+from kemba_cli.common import Force, Foreign, Show, newest, open_page, put
 
 
 def view(
@@ -25,11 +25,8 @@ def view(
         Path | None, typer.Option(help="Recording (.rrd) for the Rerun viewer to write instead.")
     ] = None,
     column_map: Foreign = None,
-    show: Annotated[bool, typer.Option("--show", help="Open it in the browser.")] = False,
+    show: Show = False,
     force: Force = False,
-    own_effects: OwnEffects = None,
-    json: Json = False,
-    quiet: Quiet = False,
 ) -> None:
     """Write a motion in 3-D as a self-contained HTML page, to turn, zoom and play, or for Rerun.
 
@@ -37,10 +34,8 @@ def view(
     """
     from kemba.report.view import record_run, view_run
 
-    shown, how = motion or newest(quiet), (model, force, column_map, run)
+    shown, how = motion or newest(), (model, force, column_map, run)
     path = view_run(shown, out, *how) if rerun is None else record_run(shown, rerun, *how)
-    print_json({"view": str(path)}) if json else typer.echo(path)
+    put({"view": str(path)}, path)
     if show and rerun is None:
-        import webbrowser
-
-        webbrowser.open(path.resolve().as_uri())
+        open_page(path)

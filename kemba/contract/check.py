@@ -189,16 +189,6 @@ def same(found: np.ndarray, wanted: np.ndarray, rtol: float, atol: float) -> boo
     return found.shape == wanted.shape and bool(np.allclose(found, wanted, rtol=rtol, atol=atol))
 
 
-def measures(effect: type[Effect]) -> bool:
-    """Whether the effect is a fault of a sensor."""
-    return issubclass(effect, SensorEffect)
-
-
-def moves(effect: type[Effect]) -> bool:
-    """Whether the effect enters the equations of motion."""
-    return effect.moves
-
-
 def sensor_fault_can_be_undone(placed: Placed) -> None:
     """A sensor fault changes what is measured, and `undone` is the inverse of `measured`. Raises
     Broken otherwise."""
@@ -365,6 +355,6 @@ CHECKS = (
     Check(supply_can_be_left_open),
     Check(keeps_the_mirror, _on_legs),
     Check(one_leg_only, lambda effect: bool(effect.off) and _on_legs(effect)),
-    Check(sensor_fault_can_be_undone, measures),
-    Check(nominal_figures_matter, moves),
+    Check(sensor_fault_can_be_undone, lambda effect: issubclass(effect, SensorEffect)),
+    Check(nominal_figures_matter, lambda effect: effect.moves),
 )

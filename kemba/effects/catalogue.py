@@ -8,8 +8,7 @@ from kemba.effects.base import Deviation, Effect
 from kemba.effects.expression import Expression
 from kemba.effects.mechanics import boom, geometry, ground, hip, load, piston
 from kemba.effects.pneumatics import gas, hose, supply, valve
-from kemba.effects.pneumatics.chamber import Chamber
-from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.chamber import Chamber, ModeDamping
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.effects.registry import Registry
 from kemba.effects.rigs import axis, friction

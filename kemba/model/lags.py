@@ -1,8 +1,7 @@
 """A model with first-order chambers in the place of physical ones: easier to plan with."""
 
 from kemba.effects.catalogue import PHYSICAL
-from kemba.effects.pneumatics.chamber import Chamber
-from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.chamber import Chamber, ModeDamping
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.model.model import Model
 

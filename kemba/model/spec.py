@@ -4,7 +4,7 @@ Models are also changed here: numbers by name, or drawn at random.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -221,9 +221,7 @@ def build_model(
         raise KembaError(f"model {spec.name}", "robot: missing", expected)
     robot = load_robot(spec.robot)
     mechanism = rig_mechanism(robot.cylinder) if rig else robot_mechanism(robot).on(scene, at)
-    effects: list[Effect] = [*spec.effects, *CHAMBERS[spec.chambers or "first_order"]()]
-    named = {e.name: e for e in (*effects, *spec.effects)}
-    listed = [*named.values()]
+    listed: Sequence[Effect] = _listed(spec)
     if rig:
         listed = [e for e in listed if set(e.ports) <= {"piston"} and e.kind != "end_stop"]
     named = {e.name: e for e in (*listed, *extra)}

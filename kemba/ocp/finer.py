@@ -10,7 +10,7 @@ from dataclasses import replace
 from math import ceil
 
 from kemba.ocp.certificate.certify import costs
-from kemba.ocp.certificate.status import Status, missed_of, verdict
+from kemba.ocp.certificate.status import Status, missed_of
 from kemba.ocp.continuation.continue_plan import Continuation, Continuing
 from kemba.ocp.continuation.origin import Origin, completed
 from kemba.ocp.nlp.ending import Ending
@@ -41,29 +41,20 @@ def continued(planner: Planner, origin: Origin) -> tuple[Plan | None, str]:
         return None, f"its result is not what was asked: {missed_of(certificate.missed)}"
     if not certificate.within(task.tolerances):
         return None, "its result misses the task's tolerances"
-    status, sentence = verdict(task, certificate, new, answer.ending)
-    facts = f"{sentence}, in {len(answer.phases)} phases of contacts and valves, from {origin.name}"
-    cost, before = costs(model, new), costs(origin.model, origin.plan)
-    if cost[TORQUE] > Continuing.dear * before[TORQUE]:
-        times = f"{cost[TORQUE] / before[TORQUE]:.0f} times the squared torque"
+    asked = task, model, planner.requirements
+    found = Plan.of(*asked, new, certificate, answer.ending, way.size)
+    facts = f"{found.sentence}, {_phases(answer)}, from {origin.name}"
+    now, before = found.cost[TORQUE], costs(origin.model, origin.plan)[TORQUE]
+    if now > Continuing.dear * before:
+        times = f"{now / before:.0f} times the squared torque"
         facts += f"; it takes {times} of {origin.name}, {origin.dear}"
-    found = Plan(
-        task=task,
-        model=model,
-        requirements=tuple(planner.requirements),
-        trajectory=new,
-        certificate=certificate,
-        status=status,
-        sentence=facts,
-        cost=cost,
-        variables=way.size[0],
-        constraints=way.size[1],
-        refined=True,
-        continued=True,
-        start=f"run: {origin.run}" if origin.run else "guess",
-        stages=answer.stages,
-    )
-    return found, ""
+    start = f"run: {origin.run}" if origin.run else "guess"
+    known = replace(found, sentence=facts, start=start, stages=answer.stages)
+    return replace(known, refined=True, continued=True), ""
+
+
+def _phases(answer: Refined) -> str:
+    return f"in {len(answer.phases)} phases of contacts and valves"
 
 
 def dear(found: Plan, before: float) -> bool:
@@ -118,19 +109,10 @@ def _judged(planner: Planner, found: Plan, answer: Refined) -> Plan:
         return _unrefined(found, missed_of(certificate.missed))
     if not certificate.within(found.task.tolerances):
         return _unrefined(found, "its result misses the task's tolerances")
-    status, sentence = verdict(found.task, certificate, new, answer.ending)
-    return replace(
-        found,
-        model=planner.model,
-        requirements=tuple(planner.requirements),
-        trajectory=new,
-        certificate=certificate,
-        status=status,
-        sentence=f"{sentence}, in {len(answer.phases)} phases of contacts and valves",
-        cost=costs(planner.model, new),
-        refined=True,
-        stages=answer.stages,
-    )
+    asked, size = (planner.model, planner.requirements), (found.variables, found.constraints)
+    made = Plan.of(found.task, *asked, new, certificate, answer.ending, size)
+    sentence = f"{made.sentence}, {_phases(answer)}"
+    return replace(made, sentence=sentence, refined=True, stages=answer.stages)
 
 
 def _unrefined(found: Plan, reason: str) -> Plan:

@@ -13,8 +13,8 @@ from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify, costs, gains, objective
 from kemba.ocp.certificate.status import Status, verdict
-from kemba.ocp.infeasibility.diagnostic import Relax
-from kemba.ocp.infeasibility.explain import Explanation
+from kemba.ocp.infeasibility.explain import Explanation, Relax
+from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.relaxation.session import Attempt
@@ -52,6 +52,23 @@ class Plan:
     # the same before pulses of valves were put in
     plain: Plan | None = field(default=None, repr=False, compare=False)
 
+    @classmethod
+    def of(
+        cls,
+        task: Task,
+        model: Model,
+        requirements: Sequence[Requirement],
+        trajectory: Trajectory,
+        certificate: Certificate,
+        ending: Ending | None,
+        size: tuple[int, int],
+    ) -> Plan:
+        """A trajectory with its certificate; `ending` is that of its last solve, `size` how many
+        variables and rows it had."""
+        status, sentence = verdict(task, certificate, trajectory, ending)
+        facts = certificate, status, sentence, costs(model, trajectory)
+        return cls(task, model, tuple(requirements), trajectory, *facts, *size)
+
     @property
     def iterations(self) -> int:
         """IPOPT iterations over all solves."""
@@ -71,19 +88,8 @@ def judge(
     trajectory = to_trajectory(transcription, point.Y)
     # `grip` comes last, on the refined plan
     certificate = certify(model, task.model_copy(update={"grip": 1.0}), requirements, trajectory)
-    status, sentence = verdict(task, certificate, trajectory, point.ending)
-    return Plan(
-        task=task,
-        model=model,
-        requirements=tuple(requirements),
-        trajectory=trajectory,
-        certificate=certificate,
-        status=status,
-        sentence=sentence,
-        cost=costs(model, trajectory),
-        variables=transcription.variables,
-        constraints=transcription.constraints,
-    )
+    size = transcription.variables, transcription.constraints
+    return Plan.of(task, model, requirements, trajectory, certificate, point.ending, size)
 
 
 def explained(found: Plan, why: Explanation) -> Plan:

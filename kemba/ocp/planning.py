@@ -24,8 +24,7 @@ from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import Judge, continued, found_and_refined, from_scratch, with_grip
 from kemba.ocp.infeasibility.checks import check_task
-from kemba.ocp.infeasibility.diagnostic import Diagnostic
-from kemba.ocp.infeasibility.explain import Explanation, explanation, refusal
+from kemba.ocp.infeasibility.explain import Diagnostic, Explanation, explanation, refusal
 from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner

@@ -1,6 +1,6 @@
 """Air and friction of a cylinder from bench logs."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -9,9 +9,7 @@ import numpy as np
 
 from kemba.config import Document, dump_yaml, parse
 from kemba.effects import Effect
-from kemba.effects.pneumatics.chamber import Chamber
-from kemba.effects.pneumatics.damping import ModeDamping
-from kemba.effects.pneumatics.tables import at_supply
+from kemba.effects.pneumatics.chamber import Chamber, ModeDamping, at_supply
 from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError
 from kemba.mechanism import Cylinder, rig_mechanism
@@ -20,7 +18,7 @@ from kemba.model.model import NOMINAL_SUPPLY
 from kemba.plant.commands import Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.rigs import drive, followed
-from kemba.plant.supplies import tell_supplies
+from kemba.quantity import to_si
 from kemba.trajectory import Trajectory
 
 Key = TypeVar("Key")
@@ -381,3 +379,55 @@ def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Tr
     model = Model(rig_mechanism(cylinder), effects, supply, "bench")
     valves = {name: Profile.of(log.time, log[name]) for name in ("valve/extend", "valve/retract")}
     return drive(model, followed(log), valves, log.time)
+
+
+APART = 0.02  # share by which the pressures of two supplies differ at least
+SETTLED = 0.9  # quantile of an open chamber's pressure: it fills, and falls while the rod is fast
+VALVES = ("extend", "retract")
+
+
+def tell_supplies(logs: Mapping[str, Trajectory], supplies: Sequence[float]) -> tuple[str, ...]:
+    """Note in each log its supply [Pa]: what its sidecar says, else one of `supplies`, which go in
+    ascending order with the levels at which chambers settle, else the nominal one. Returns what is
+    to be said about it. Raises KembaError where levels and supplies differ in number."""
+    untold = []
+    for name, log in logs.items():
+        if "supply" not in log.meta and any(np.any(log[f"valve/{v}"] > 0.5) for v in VALVES):
+            untold.append((_level(log), name))
+        try:
+            log.meta["supply"] = to_si(log.meta.get("supply", NOMINAL_SUPPLY), "Pa")
+        except ValueError as error:
+            raise KembaError(f"{name}: supply", str(error)) from None
+    untold.sort()
+    groups: list[list[tuple[float, str]]] = []
+    for level, name in untold:
+        if not groups or level > (1.0 + APART) * groups[-1][-1][0]:
+            groups.append([])
+        groups[-1].append((level, name))
+    at = ", ".join(f"{np.median([level for level, _ in g]) / 1e6:.3g}" for g in groups)
+    seen = f"their chambers settle at {at} MPa (absolute)" if any(lv for lv, _ in untold) else ""
+    if len(supplies or groups[:1]) != len(groups):
+        what = f"{len(untold)} logs do not tell their supply" + (f"; {seen}" if seen else "")
+        hint = f"--supply for each of {len(groups)}, or `supply: 0.6 MPa` in NAME.meta.yaml"
+        raise KembaError(groups[0][0][1] if groups else "supply", what, hint=hint)
+    for supply, group in zip(sorted(supplies) or [NOMINAL_SUPPLY], groups, strict=False):
+        for _, name in group:
+            logs[name].meta["supply"] = supply
+    if supplies or not groups:
+        return ()
+    taken = f"{NOMINAL_SUPPLY / 1e6:g} MPa"
+    said = f"no sidecar tells the supply of {len(untold)} logs: taken as {taken}"
+    return (f"{said}, {seen or 'no pressure is logged'}; --supply tells it",)
+
+
+def _level(log: Trajectory) -> float:
+    """The pressure [Pa] of the supply if it is logged, else that at which open chambers settle, the
+    lower one of two, since a rod that moves presses on the other; 0 where none is logged."""
+    if "supply/P" in log:
+        return float(np.nanmedian(log["supply/P"]))
+    found = []
+    for valve in VALVES:
+        name, on = f"chamber/{valve}/P", log[f"valve/{valve}"] > 0.5
+        if name in log and np.isfinite(log[name][on]).any():
+            found.append(float(np.nanquantile(log[name][on], SETTLED)))
+    return min(found, default=0.0)

@@ -54,8 +54,7 @@ def execute(
     Further arguments are those of `condition_of`. Raises KembaError when the table lacks a column.
     """
     table = read_controller(controller)
-    condition, begin = condition_of(table, model, *arguments, **named)
-    return Execution(later(simulate_one(condition), begin), table)
+    return Execution(simulate_one(condition_of(table, model, *arguments, **named)), table)
 
 
 def execute_many(
@@ -67,12 +66,8 @@ def execute_many(
     An execution that fails gives its error. Raises KembaError where a case makes no sense.
     """
     table = read_controller(controller)
-    ready = [condition_of(table, **case) for case in cases]
-    done = run_many(condition for condition, _ in ready)
-    return [
-        d if isinstance(d, KembaError) else Execution(later(d, begin), table)
-        for d, (_, begin) in zip(done, ready, strict=True)
-    ]
+    done = run_many([condition_of(table, **case) for case in cases])
+    return [d if isinstance(d, KembaError) else Execution(d, table) for d in done]
 
 
 def condition_of(
@@ -85,8 +80,8 @@ def condition_of(
     dead_time: bool = True,
     valves: Mapping[str, Profile] | None = None,
     sample: float | Array = 1e-3,
-) -> tuple[Condition, float]:
-    """What `execute` simulates, and when [s] by the table's clock it begins.
+) -> Condition:
+    """What `execute` simulates, in the table's clock.
 
     The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
     the air is held until plan time 0, and one with a rate in `start` has it at that time; its
@@ -111,16 +106,7 @@ def condition_of(
     if np.ndim(sample):
         sample = np.asarray(sample) - begin
         sample = sample[(sample >= -SAME_TIME) & (sample <= duration + SAME_TIME)]
-    return Condition(model, pose, commands, duration, step, sample, dead_time), begin
-
-
-def later(done: Simulated, begin: float) -> Simulated:
-    """The simulated motion with its times from `begin` [s] on."""
-    if not begin:
-        return done
-    t = done.trajectory
-    impacts = tuple(replace(impact, time=impact.time + begin) for impact in done.impacts)
-    return Simulated(t.at_times(t.time + begin), impacts)
+    return Condition(model, pose, commands, duration, step, sample, dead_time, begin)
 
 
 def read_controller(source: Trajectory | str | Path) -> Trajectory:

@@ -109,12 +109,10 @@ class Player:
     def _fetch_impacts(self) -> None:
         log, gaps = self._log, self.pairs.gaps
         for i in range(log.number[0]):
-            impulses = log.impulse[i][gaps]
-            hit = impulses > NOTICED
+            hit = log.impulse[i][gaps] > NOTICED
             labels = tuple(self.pairs.labels[row] for row in gaps[hit])
             speeds = tuple((-log.rate[i][hit]).tolist())
-            size, lost = float(impulses.max()), float(log.lost[i])
-            self.impacts.append(Impact(float(log.time[i]), labels, size, lost, speeds))
+            self.impacts.append(Impact(float(log.time[i]), labels, float(log.lost[i]), speeds))
         log.number[0] = 0
 
     def _answer(self) -> None:

@@ -11,12 +11,11 @@ from kemba.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Impact:
-    """An inelastic impact: when [s], at which pairs, its largest impulse [N.s], the kinetic
-    energy lost [J], and how fast the gap of each pair was closing before [m/s]."""
+    """An inelastic impact: when [s], at which pairs, the kinetic energy lost [J], and how fast the
+    gap of each pair was closing before [m/s]."""
 
     time: float
     labels: tuple[str, ...]
-    impulse: float
     lost: float
     speeds: tuple[float, ...]
 

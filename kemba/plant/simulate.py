@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from threading import Thread
 from typing import TYPE_CHECKING, Any
@@ -110,6 +110,7 @@ class Condition:
     and no longer than that. Valve switchings, controller ticks and impacts end steps exactly.
     `sample` [s], or the times themselves (m,). `dead_time`: valves act later than sent, by the
     model's own timing; their columns show them as sent. Values at a sample hold just after it.
+    `begin` [s]: when it begins by the clock of the motion; all times here count from there.
     """
 
     model: Model
@@ -119,6 +120,7 @@ class Condition:
     step: float | None = None
     sample: float | Array = 1e-3
     dead_time: bool = True
+    begin: float = 0.0
 
 
 def simulate(model: Model, *arguments: Any, **named: Any) -> Trajectory:
@@ -191,8 +193,10 @@ def _played(player: Player, condition: Condition) -> Simulated:
             raise
         player = _player(condition)
         player.play(SHORT)
-    motion = trajectory(player.model, player.equations, player.times, player.table)
-    return Simulated(motion, tuple(player.impacts))
+    begin = condition.begin
+    motion = trajectory(player.model, player.equations, player.times + begin, player.table)
+    impacts = (replace(impact, time=impact.time + begin) for impact in player.impacts)
+    return Simulated(motion, tuple(impacts))
 
 
 def _samples(duration: float, sample: float | Array) -> Array:

@@ -109,48 +109,16 @@ def plot_ladder(
     return figure
 
 
+HEAT = "error / noise (bold: significant)"
 FLOOR, CEILING = 1.0, 30.0  # error ratios between which the heat map changes its colour
 TICKS = (1, 3, 10, 30)
 ROW, LEVEL = 0.19, 0.13  # in, height of a channel and of a line of labels
-Condition = str | tuple[str, ...]  # of several levels: the outermost first
+Condition = tuple[str, ...]  # its levels, the outermost first
 
 
-@paper_style
-def plot_heat_map(
-    tables: Mapping[str, Any],
-    channels: Sequence[str],
-    conditions: Sequence[Condition],
-    significant: Mapping[str, Any] | None = None,
-) -> Figure:
-    """Error ratios by channel and condition; 1 is the noise floor, NaN was never visited.
-
-    `tables`: arrays (channels, conditions) by title, such as `before` and `after`, one below the
-    other on one colour scale. `significant`: arrays of the same shape; these numbers are bold.
-    """
-    each = heat_height(len(channels), conditions)
-    figure = paper_figure(each * len(tables) + 0.3)
-    grid = figure.subplots(len(tables), 1, squeeze=False)[:, 0]
-    for axes, (title, values) in zip(grid, tables.items(), strict=True):
-        bold = (significant or {}).get(title, np.zeros(np.shape(values), bool))
-        image = draw_heat(axes, np.asarray(values, dtype=float), np.asarray(bold))
-        axes.set_title(title if len(tables) > 1 else "", loc="left", fontweight="bold")
-        axes.set_yticks(range(len(channels)), channels)
-        name_conditions(axes, conditions)
-    add_bar(figure, image, list(grid), "error / noise")
-    return figure
-
-
-def heat_height(channels: int, conditions: Sequence[Condition]) -> float:
-    """Inches that one table needs."""
-    names = [(c,) if isinstance(c, str) else c for c in conditions]
-    levels = max(len(c) + sum(name.count("\n") for name in c) for c in names)
-    return ROW * channels + LEVEL * levels + 0.3
-
-
-def add_bar(figure: FigureBase, image: Any, grid: Sequence[Axes], label: str) -> None:
+def add_bar(figure: FigureBase, image: Any, grid: Sequence[Axes]) -> None:
     """The colour scale beside the tables."""
     bar = figure.colorbar(image, ax=list(grid), extend="both", pad=0.01, aspect=12 * len(grid))
-    bar.set_label(label)
     bar.set_ticks(TICKS, labels=[str(t) for t in TICKS])
     bar.minorticks_off()
 
@@ -182,9 +150,8 @@ def draw_heat(axes: Axes, values: Array, bold: np.ndarray[Any, Any]) -> Any:
     return image
 
 
-def name_conditions(axes: Axes, conditions: Sequence[Condition]) -> None:
+def name_conditions(axes: Axes, levels: Sequence[Condition]) -> None:
     """Labels below the columns; outer levels are written once for all that they span."""
-    levels = [(c,) if isinstance(c, str) else c for c in conditions]
     deep = len(levels[0])
     axes.set_xticks(range(len(levels)), [c[-1] for c in levels])
     for level in range(deep - 1):
@@ -222,13 +189,11 @@ def plot_comparison(found: Comparison) -> Figure:
     tables = columns_of(found.bins)
     bands = bands_of(found.missing)
     panels = panels_of(found.force_profiles)
-    channels = list(dict.fromkeys(c.channel for c in found.bins))
-    heights = [len(channels) * ROW + 4 * LEVEL + 0.3] * len(tables)
-    parts = [sum(heights), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
+    parts = [heat_height(found.bins, tables), 0.85 * len(bands) + 0.35, 1.75 if panels else 0.0]
     figure = paper_figure(sum(parts))
     rooms = figure.subfigures(3, 1, height_ratios=[max(p, 0.01) for p in parts], squeeze=False)
     heat, time, force = rooms[:, 0]
-    _heat(heat, found.bins, channels, tables)
+    draw_heat_maps(heat, {HEAT: found.bins}, tables)
     if bands:
         _bands(time, bands)
         time.axes[0].set_title("missing force", loc="left")
@@ -265,20 +230,33 @@ def place_of(column: Column) -> tuple[int, str, int]:
     return [*PHASES, phase].index(phase), mode, REGIONS.index(region)
 
 
-def _heat(
-    room: SubFigure,
-    listed: Sequence[ConditionBin],
-    channels: Sequence[str],
-    tables: list[list[Column]],
+def heat_height(listed: Sequence[ConditionBin], tables: Sequence[list[Column]]) -> float:
+    """Inches that the heat maps of these bins need."""
+    return (len(channels_of(listed)) * ROW + 4 * LEVEL + 0.3) * len(tables)
+
+
+def channels_of(listed: Sequence[ConditionBin]) -> list[str]:
+    """The channels of bins, a row each."""
+    return list(dict.fromkeys(c.channel for c in listed))
+
+
+def draw_heat_maps(
+    room: FigureBase,
+    groups: Mapping[str, Sequence[ConditionBin]],
+    tables: Sequence[list[Column]],
 ) -> None:
-    grid = room.subplots(len(tables), 1, squeeze=False)[:, 0]
-    for axes, columns in zip(grid, tables, strict=True):
-        image = draw_heat(axes, *heat_table(listed, channels, columns))
+    """Error ratios by channel and condition, of every group of bins by its title, one below the
+    other on one colour scale: 1 is the noise floor, bold is significant."""
+    channels = channels_of([one for listed in groups.values() for one in listed])
+    shown = [(title, columns) for title in groups for columns in tables]
+    grid = room.subplots(len(shown), 1, squeeze=False)[:, 0]
+    for axes, (title, columns) in zip(grid, shown, strict=True):
+        image = draw_heat(axes, *heat_table(groups[title], channels, columns))
+        axes.set_title(title if columns is tables[0] else "", loc="left")
         axes.set_yticks(range(len(channels)), channels)
         name_conditions(axes, in_words(columns))
-    grid[0].set_title("error / noise (bold: significant)", loc="left")
-    if len(channels) * len(tables) > 3:  # there is no room for a scale beside one row
-        add_bar(room, image, list(grid), "")
+    if len(channels) * len(shown) > 3:  # there is no room for a scale beside one row
+        add_bar(room, image, list(grid))
 
 
 def heat_table(

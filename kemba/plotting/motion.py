@@ -80,28 +80,35 @@ def plot_motion(
         expected = "columns of the robot log format, such as 'body/z [m]', were expected"
         raise KembaError(sources[0].name, "has nothing to plot", expected)
     shown = film(sources[0], machine)
-    heights = [row[0].height for row in rows]
-    if shown:
-        heights.insert(0, strip_height(shown, machine, STRIP))
-    figure = paper_figure(sum(heights) + 0.14 * len(heights) + 0.4, figure=figure)
-    grid = figure.add_gridspec(len(heights), max(map(len, rows)), height_ratios=heights)
+    above = [strip_height(shown, machine, STRIP)] if shown else []
+    figure, grid = _sheet(figure, rows, above)
     if shown:
         strip = figure.add_subplot(grid[0, :])
         draw_strip(strip, sources[0], machine, shown, STRIP, valves=len(sources) == 1)
-    axes = _axes(figure, grid, rows, first=int(bool(shown)))
+    axes = _axes(figure, grid, rows, first=len(above))
     for row, panels in zip(axes, rows, strict=True):
         for ax, panel in zip(row, panels, strict=True):
             draw_panel(ax, panel, sources, machine.limits)
             shade(ax, stance_spans(sources[0], machine, panel.owner))
             widen(ax, panel.least)
     _name_legs(axes, rows, legs)
-    if len(sources) > 1:
-        name_sources(figure, sources)
+    name_sources(figure, sources)
     return figure
 
 
+def _sheet(
+    figure: Figure | None, rows: list[list[Panel]], above: Sequence[float] = ()
+) -> tuple[Figure, GridSpec]:
+    """A figure with room for rows of panels, and for what is `above` them, by its heights [in]."""
+    heights = [*above, *(row[0].height for row in rows)]
+    figure = paper_figure(sum(heights) + 0.14 * len(heights) + 0.4, figure=figure)
+    return figure, figure.add_gridspec(len(heights), max(map(len, rows)), height_ratios=heights)
+
+
 def name_sources(figure: Figure, sources: Sequence[Source]) -> None:
-    """The runs' names with their colours, above everything."""
+    """The runs' names with their colours, above everything, where there are several."""
+    if len(sources) == 1:
+        return
     lines = [Line2D([], [], color=colour(i)) for i in range(len(sources))]
     names = [source.name for source in sources]
     columns = min(4, len(names))
@@ -126,7 +133,9 @@ def _rows(sources: Sequence[Source], legs: tuple[str, ...]) -> list[list[Panel]]
     return rows
 
 
-def _axes(figure: Figure, grid: GridSpec, rows: list[list[Panel]], first: int) -> list[list[Axes]]:
+def _axes(
+    figure: Figure, grid: GridSpec, rows: list[list[Panel]], first: int = 0
+) -> list[list[Axes]]:
     """Axes that share their time, and in a leg's row their numbers."""
     table: list[list[Axes]] = []
     for number, panels in enumerate(rows):
@@ -141,7 +150,7 @@ def _axes(figure: Figure, grid: GridSpec, rows: list[list[Panel]], first: int) -
     return table
 
 
-def _name_legs(axes: list[list[Axes]], rows: list[list[Panel]], legs: tuple[str, ...]) -> None:
+def _name_legs(axes: list[list[Axes]], rows: list[list[Panel]], legs: tuple[str, ...] = ()) -> None:
     """Labels at the outer edges only, and each leg's name above its column."""
     named = False
     for number, (row, panels) in enumerate(zip(axes, rows, strict=True)):
@@ -201,24 +210,16 @@ def plot_bench(sources: Sequence[Source], figure: Figure | None = None) -> Figur
     Columns that a source lacks drop their trace. Raises KembaError with nothing to draw.
     """
     sources = [_joined(source) for source in sources]
-    panels = [panel for panel in PANELS if any(panel.found_in(source) for source in sources)]
-    if not panels:
+    rows = [[panel] for panel in PANELS if any(panel.found_in(source) for source in sources)]
+    if not rows:
         expected = "columns of the bench log format, such as 'piston/F [N]', were expected"
         raise KembaError(sources[0].name, "has nothing to plot", expected)
-    heights = [panel.height for panel in panels]
-    figure = paper_figure(sum(heights) + 0.14 * len(heights) + 0.4, figure=figure)
-    grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
-    first = None
-    for number, panel in enumerate(panels):
-        axes = figure.add_subplot(grid[number], sharex=first)
-        first = first or axes
-        draw_panel(axes, panel, sources, {})
-        axes.set_ylabel("" if panel.raster else panel.label)
-        axes.tick_params(labelbottom=panel is panels[-1])
-    axes.set_xlabel("time [s]")
-    figure.align_ylabels()
-    if len(sources) > 1:
-        name_sources(figure, sources)
+    figure, grid = _sheet(figure, rows)
+    axes = _axes(figure, grid, rows)
+    for (ax,), (panel,) in zip(axes, rows, strict=True):
+        draw_panel(ax, panel, sources, {})
+    _name_legs(axes, rows)
+    name_sources(figure, sources)
     return figure
 
 

@@ -11,8 +11,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.config import load_yaml
-from kemba.effects.pneumatics.chamber import STEADY, Chamber
-from kemba.effects.pneumatics.tables import at_supply
+from kemba.effects.pneumatics.chamber import STEADY, Chamber, at_supply
 from kemba.errors import KembaError
 from kemba.events import (
     EXECUTED,

@@ -14,12 +14,12 @@ from kemba.identify.infer.linear import NULL, Hypothesis
 from kemba.identify.infer.windows import free_starts
 from kemba.identify.problem.problem import Rows
 from kemba.plotting.comparison import (
+    HEAT,
     bands_of,
-    heat_table,
-    in_words,
-    place_of,
+    columns_of,
+    draw_heat_maps,
+    heat_height,
     plot_bands,
-    plot_heat_map,
     plot_ladder,
 )
 from kemba.plotting.style import (
@@ -56,18 +56,18 @@ def theta_of(found: Discovery, hypothesis: Hypothesis) -> dict[str, float]:
     return {key: fitted[key] for keys in listed for key in keys}
 
 
+@paper_style
 def plot_cells(found: Discovery) -> Figure:
     """Error by noise, by channel and by motion and valve mode: of the start model, and with
     what was found."""
-    steps = {"before": NULL, "after": found.best} if found.best else {"": NULL}
+    steps = {"before: ": NULL, "after: ": found.best} if found.best else {"": NULL}
     problem = found.search.problem
-    listed = {t: conditions(problem, theta_of(found, h)) for t, h in steps.items()}
-    first = next(iter(listed.values()))
-    channels = list(dict.fromkeys(c.channel for c in first))
-    columns = sorted({(c.phase, c.mode, c.region) for c in first}, key=place_of)
-    shown = {title: heat_table(group, channels, columns) for title, group in listed.items()}
-    tables, bold = ({title: pair[i] for title, pair in shown.items()} for i in (0, 1))
-    return plot_heat_map(tables, channels, in_words([(c[0], c[1], "") for c in columns]), bold)
+    groups = {when + HEAT: conditions(problem, theta_of(found, h)) for when, h in steps.items()}
+    first = next(iter(groups.values()))
+    tables = columns_of(first)
+    figure = paper_figure(heat_height(first, tables) * len(groups) + 0.3)
+    draw_heat_maps(figure, groups, tables)
+    return figure
 
 
 def plot_explained(found: Discovery) -> Figure:

@@ -180,7 +180,8 @@ def course_of(model: Model, table: Trajectory) -> EventCourse:
     """The linearised execution of a controller table. Raises KembaError where the table cannot be
     simulated, ValueError for a model with other pairs than rigid contacts and stops."""
     table, hybrid = read_controller(table), Hybrid(model)
-    condition, begin = condition_of(table, model)
+    condition = condition_of(table, model)
+    begin, condition = condition.begin, replace(condition, begin=0.0)
     commands, last = condition.commands, condition.duration
     assert commands is not None and isinstance(commands.feedback, JointControl)
     acting = delayed(model, dict(commands.profiles))

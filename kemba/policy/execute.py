@@ -9,7 +9,7 @@ import numpy as np
 
 from kemba.model import Model
 from kemba.plant.commands import Commands
-from kemba.plant.controller import PERIOD, Execution, condition_of, later, read_controller
+from kemba.plant.controller import PERIOD, Execution, condition_of, read_controller
 from kemba.plant.repeat import VALVE_SCATTER, Play, Sensors
 from kemba.plant.simulate import simulate_one
 from kemba.policy.modes import FINE, Array
@@ -83,14 +83,14 @@ def execute_policy(
     Raises KembaError when the table lacks a column.
     """
     table = read_controller(run)
-    condition, begin = condition_of(table, model, extra=extra, start=start, sample=sample)
+    condition = condition_of(table, model, extra=extra, start=start, sample=sample)
     usual = Sensors.usual().noise if noise else {}
     rng = np.random.default_rng(seed)
-    held = round((begin - table.time[0]) / PERIOD)
+    held = round((condition.begin - table.time[0]) / PERIOD)
     driver = Driver(policy, model, _knees(model), usual, rng, scatter, held)
     commands = Commands({}, driver, PERIOD / FINE)
     done = simulate_one(replace(condition, commands=commands))
-    return Execution(later(done, begin), _sent(table, policy, driver.commands))
+    return Execution(done, _sent(table, policy, driver.commands))
 
 
 def _sent(table: Trajectory, policy: Policy, commands: list[Array]) -> Trajectory:

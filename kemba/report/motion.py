@@ -15,47 +15,48 @@ DEGREES = 180.0 / np.pi
 
 @dataclass(frozen=True)
 class Shown:
-    """A quantity on the page: its column, title, unit and factor from SI; for its error another
-    unit and factor. `least`, `error_least`: smallest span of their axes, so that noise and
-    rounding are not magnified."""
+    """A quantity on the page: its column, title, unit and factor from SI. `least`, `error_least`:
+    smallest span of its axis and of that of its error, so that noise and rounding are not
+    magnified."""
 
     name: str
     title: str
     unit: str
     factor: float = 1.0
-    error: str = ""
-    error_factor: float = 1.0
     least: float = 0.0
     error_least: float = 0.0
     steps: bool = False
     level: str = ""
 
+    @property
+    def error(self) -> tuple[str, float]:
+        """Unit of its error and factor from SI: lengths in metres are off by millimetres."""
+        return ("mm", 1e3) if self.unit == "m" else (self.unit, self.factor)
+
 
 BODY = (
-    Shown("body/z", "Height of the body's centre", "m", 1.0, "mm", 1e3, 0.05, 1.0),
-    Shown("body/x", "Body forward", "m", 1.0, "mm", 1e3, 0.05, 1.0),
-    Shown("body/pitch", "Pitch, nose up", "deg", DEGREES, "deg", DEGREES, 4.0, 0.2),
+    Shown("body/z", "Height of the body's centre", "m", 1.0, 0.05, 1.0),
+    Shown("body/x", "Body forward", "m", 1.0, 0.05, 1.0),
+    Shown("body/pitch", "Pitch, nose up", "deg", DEGREES, 4.0, 0.2),
 )
 JOINTS = (
-    Shown("hip/q", "hip angle", "deg", DEGREES, "deg", DEGREES, error_least=0.2),
-    Shown("piston/x", "piston extension", "mm", 1e3, "mm", 1e3, 0.0, 1.0, level="piston/x"),
+    Shown("hip/q", "hip angle", "deg", DEGREES, error_least=0.2),
+    Shown("piston/x", "piston extension", "mm", 1e3, error_least=1.0, level="piston/x"),
 )
 FORCES = (
-    Shown(
-        "hip/tau", "hip torque", "N.m", error="N.m", error_least=0.2, steps=True, level="hip/tau"
-    ),
-    Shown("chamber/extend/P", "pressure of the extend chamber", "bar", 1e-5, "bar", 1e-5),
-    Shown("chamber/retract/P", "pressure of the retract chamber", "bar", 1e-5, "bar", 1e-5),
-    Shown("piston/F", "force of the piston rod", "N", error="N"),
-    Shown("foot/Fz", "ground force, upward", "N", error="N"),
-    Shown("foot/Fx", "ground force, along", "N", error="N"),
+    Shown("hip/tau", "hip torque", "N.m", error_least=0.2, steps=True, level="hip/tau"),
+    Shown("chamber/extend/P", "pressure of the extend chamber", "bar", 1e-5),
+    Shown("chamber/retract/P", "pressure of the retract chamber", "bar", 1e-5),
+    Shown("piston/F", "force of the piston rod", "N"),
+    Shown("foot/Fz", "ground force, upward", "N"),
+    Shown("foot/Fx", "ground force, along", "N"),
 )
 RIG = (
-    Shown("piston/x", "Piston extension", "mm", 1e3, "mm", 1e3, least=1.0),
-    Shown("piston/v", "Piston speed", "m/s", error="m/s", least=0.01),
-    Shown("piston/F", "Force of the piston rod", "N", error="N", least=1.0),
-    Shown("chamber/extend/P", "Pressure of the extend chamber", "bar", 1e-5, "bar", 1e-5, 0.1),
-    Shown("chamber/retract/P", "Pressure of the retract chamber", "bar", 1e-5, "bar", 1e-5, 0.1),
+    Shown("piston/x", "Piston extension", "mm", 1e3, least=1.0),
+    Shown("piston/v", "Piston speed", "m/s", least=0.01),
+    Shown("piston/F", "Force of the piston rod", "N", least=1.0),
+    Shown("chamber/extend/P", "Pressure of the extend chamber", "bar", 1e-5, 0.1),
+    Shown("chamber/retract/P", "Pressure of the retract chamber", "bar", 1e-5, 0.1),
 )
 NO_FORCE_ERROR = ("foot/Fz", "foot/Fx")  # a touchdown some ms late would fill the chart
 
@@ -86,7 +87,7 @@ def rig_charts(book: Book) -> str:
     for header in named:
         name, _, unit = header.rstrip("]").partition(" [")
         if "valve/" not in name:
-            q = known.get(name, Shown(name, name, unit, error=unit))
+            q = known.get(name, Shown(name, name, unit))
             figures.append(book.add(*_pair(book, q, q.name, q.title, ())))
     figures.append(book.add(*valve_chart(book, "", ())))
     return f'<div class="grid">{"".join(figures)}</div>'
@@ -109,14 +110,14 @@ def _pair(
     yield Chart(title, q.unit, lines, levels=levels, stands=stands, least=q.least)
     plan = plan_of(book.tracks)
     if plan and name in plan.t and len(values) > 1 and q.name not in NO_FORCE_ERROR:
-        planned = values[book.tracks.index(plan)]
+        planned, (unit, factor) = values[book.tracks.index(plan)], q.error
         errors = [
-            Curve(f"{names[i]} minus plan", q.error_factor * (v - planned), i)
+            Curve(f"{names[i]} minus plan", factor * (v - planned), i)
             for i, v in values.items()
             if book.tracks[i] is not plan
         ]
         least = q.error_least
-        yield Chart(f"{title}, error", q.error, errors, stands=stands, small=True, least=least)
+        yield Chart(f"{title}, error", unit, errors, stands=stands, small=True, least=least)
 
 
 def valve_chart(book: Book, leg: str, stands: Spans) -> Iterable[Chart]:

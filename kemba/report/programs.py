@@ -23,7 +23,7 @@ from kemba.ocp.relaxation.settings import Relaxation
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.transcription.transcribe import Parameters
 from kemba.runs import load_run
-from kemba.sensitivity.replanned import PlanProgram
+from kemba.sensitivity.table import plan_program
 from kemba.trajectory import Trajectory
 
 FUNCTIONS = ("nlp", "grad_f", "jac_g", "hess_lag")
@@ -61,7 +61,7 @@ def relaxed(task: Task, model: Model, document: Document) -> Named:
 
 def refined(task: Task, model: Model, plan: Trajectory) -> Named:
     """The program of a refined plan: modes fixed, phase durations free. Raises KembaError."""
-    program, start = PlanProgram.of(task, model, plan).built(task, model)
+    program, start = plan_program(task, model, plan)
     return Named("refined", program, start, [], [row.label for row in program.rows])
 
 

@@ -19,7 +19,19 @@ from kemba.model import build_model, load_spec
 from kemba.plotting.source import Machine, load_machine
 from kemba.policy.modes import LATEST
 from kemba.quantity import to_si
-from kemba.report.charts import Book, Rows, Track, folded, gather, grid_of, pairs, plan_of, section
+from kemba.report.charts import (
+    Book,
+    Rows,
+    Track,
+    folded,
+    gather,
+    grid_of,
+    in_plans_clock,
+    pairs,
+    plan_of,
+    section,
+    start_of,
+)
 from kemba.report.limits import energy_parts, event_table, limit_parts
 from kemba.report.model_error import (
     Facts,
@@ -39,7 +51,6 @@ from kemba.report.motion import (
     marks_of,
     rig_charts,
 )
-from kemba.report.plan_clock import in_plans_clock, start_of
 from kemba.report.verdict import ReviewVerdict, of_answer, of_bad_data, of_logs, of_plan
 from kemba.report.view import page_text, stage, write_page
 from kemba.runs import POLICY, Run, load_run

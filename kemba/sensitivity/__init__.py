@@ -1,6 +1,5 @@
 """What small changes of a task or a machine do: to the same commands, and to the plan made anew."""
 
-from kemba.sensitivity.replanned import FigureStep, figures
-from kemba.sensitivity.table import Sensitivity, sensitivity, write_sensitivity
+from kemba.sensitivity.table import FigureStep, Sensitivity, figures, sensitivity, write_sensitivity
 
 __all__ = ["FigureStep", "Sensitivity", "figures", "sensitivity", "write_sensitivity"]

@@ -85,23 +85,6 @@ def test_compare_reads_the_earlier_form_too(words: list[str], meant: list[str]) 
     assert read(words)["logs"] == [Path("a.csv")]
 
 
-def test_characterise_tells_a_new_folder_from_logs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("bench").mkdir()
-    Path("bench/a.csv").touch()
-
-    def read(*words: str) -> tuple[object, ...]:
-        found = COMMANDS["characterise"].make_context("characterise", list(words)).params
-        return found["logs"], found["figure"], found["figures"]
-
-    logs = [Path("bench")]
-    assert read("bench", "--figure", "drawn") == (logs, None, Path("drawn"))
-    assert read("--figure", "bench") == (logs, True, None)
-    assert read("bench", "--no-figure") == (logs, False, None)
-
-
 def test_a_name_means_the_same_everywhere() -> None:
     """One option name has one parameter, so that what is learnt at one verb holds for the next."""
     meant: dict[str, set[str]] = defaultdict(set)

@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from kemba_cli import next_steps
-from kemba_cli.common import effect_files
+from kemba_cli.common import speaking
 from kemba_cli.main import PANELS, app
 
 GROUP: Any = typer.main.get_command(app)
@@ -79,12 +79,10 @@ def test_nothing_is_said_where_nothing_follows(tmp_path: Path) -> None:
 
 
 def test_effects_of_ones_own_go_along(capsys: pytest.CaptureFixture[str]) -> None:
-    before = effect_files.set((Path("my effects.py"),))
-    try:
-        next_steps.say_next("solve jump.yaml", quiet=False)
-        next_steps.say_next("", quiet=False)
-        next_steps.say_next("solve jump.yaml", quiet=True)
-    finally:
-        effect_files.reset(before)
+    with speaking(effects=[Path("my effects.py")]):
+        next_steps.say_next("solve jump.yaml")
+        next_steps.say_next("")
+    with speaking(effects=[Path("my effects.py")], quiet=True):
+        next_steps.say_next("solve jump.yaml")
     said = capsys.readouterr().err
     assert said == "next: kemba-opt solve jump.yaml --effects 'my effects.py'\n"

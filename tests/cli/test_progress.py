@@ -6,6 +6,7 @@ import pytest
 
 from kemba.stopwatch import Stage
 from kemba_cli import progress as courses
+from kemba_cli.common import speaking
 from kemba_cli.progress import (
     COMPARE,
     DISCOVER,
@@ -127,7 +128,7 @@ def test_seconds_in_words() -> None:
 
 def test_lines_where_no_one_watches(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
     """One line a stage with the time left; of stages that are alike one in two seconds."""
-    with Progress(False, {"reading": 0.0, "executing": 0.5}) as progress:
+    with Progress({"reading": 0.0, "executing": 0.5}) as progress:
         progress.tell("reading")
         clock.now += 4.0
         for number in range(1, 6):
@@ -139,7 +140,7 @@ def test_lines_where_no_one_watches(clock: Clock, capsys: pytest.CaptureFixture[
 
 
 def test_quiet_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    with Progress(True, SOLVE) as progress:
+    with speaking(quiet=True), Progress(SOLVE) as progress:
         progress.tell("relax")
         progress.watch(10, 1.0, 1e-3)
     assert capsys.readouterr().err == ""

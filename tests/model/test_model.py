@@ -10,8 +10,7 @@ from kemba.effects import BY_KIND, Effect
 from kemba.effects.base import At, Contribution
 from kemba.effects.mechanics.load import Payload
 from kemba.effects.mechanics.piston import EndStop
-from kemba.effects.pneumatics.chamber import Chamber
-from kemba.effects.pneumatics.damping import ModeDamping
+from kemba.effects.pneumatics.chamber import Chamber, ModeDamping
 from kemba.effects.pneumatics.supply import SupplyScale
 from kemba.effects.pneumatics.valve import Valve
 from kemba.errors import KembaError

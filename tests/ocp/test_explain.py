@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from kemba.config import find_config
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.infeasibility.checks import air_work, check_task, inertia_and_weight
-from kemba.ocp.infeasibility.diagnostic import Diagnostic, Relax
+from kemba.ocp.infeasibility.explain import Diagnostic, Relax
 from kemba.ocp.task.resolve import resolve
 from kemba_cli.main import app
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kemba.ocp import finer
+from kemba.ocp import finer, planned
 from kemba.ocp.certificate.certify import objective
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.continuation.continue_plan import renoded
@@ -123,10 +123,11 @@ def test_a_plan_that_costs_over_thrice_the_earlier_one_is_said_to(
     )  # fmt: skip
     known.certificate, known.run = known, lambda: known
     monkeypatch.setattr(finer, "Continuation", lambda *_: known)
-    monkeypatch.setattr(finer, "verdict", lambda *_: (Status.SOLVED, "solved"))
-    monkeypatch.setattr(
-        finer, "costs", lambda _, plan: {finer.TORQUE: 4.0 if plan == "old" else torque}
-    )
+    monkeypatch.setattr(planned, "verdict", lambda *_: (Status.SOLVED, "solved"))
+    for module in (finer, planned):
+        monkeypatch.setattr(
+            module, "costs", lambda _, plan: {finer.TORQUE: 4.0 if plan == "old" else torque}
+        )
     task = SimpleNamespace(refine="radau", tolerances=None)
     session = SimpleNamespace(control=None, tell=None, attempts=[])
     planner: Any = SimpleNamespace(session=session, task=task, model=None, requirements=[])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from kemba.errors import KembaError
+from kemba.plant.characterise import tell_supplies
 from kemba.plant.rigs import LockedRig, bench_model, run_rig
-from kemba.plant.supplies import tell_supplies
 from kemba.trajectory import Trajectory
 
 SUPPLIES = (0.6e6, 0.7e6, 0.8e6)

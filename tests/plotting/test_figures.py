@@ -2,11 +2,20 @@
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
 from kemba.errors import KembaError
+from kemba.identify.compare.bins import ConditionBin
 from kemba.plotting import draw
-from kemba.plotting.comparison import Band, plot_bands, plot_heat_map, plot_ladder
+from kemba.plotting.comparison import (
+    Band,
+    columns_of,
+    draw_heat_maps,
+    name_conditions,
+    plot_bands,
+    plot_ladder,
+)
 from kemba.plotting.motion import plot_bench, plot_force_velocity
 from kemba.plotting.source import Source
 from kemba.trajectory import Trajectory
@@ -50,21 +59,29 @@ def test_force_over_velocity() -> None:
     assert axes.get_legend_handles_labels()[1] == ["extend", "none"]
 
 
+def heat(ratio: float, q: float = 1.0, **place: str) -> ConditionBin:
+    """A bin of a comparison, with a place that does not matter unless it is given."""
+    known = {"channel": "body/z [m]", "phase": "rest", "mode": "00", "region": "", **place}
+    return ConditionBin(**known, ratio=ratio, q_value=q)
+
+
 def test_heat_map_tells_its_numbers() -> None:
-    before = np.array([[1.0, 45.0], [np.nan, 130.0]])
-    tables = {"before": before, "after": np.minimum(before, 1.1)}
-    bold = {"before": before > 3}
-    figure = plot_heat_map(tables, ["body/z [m]", "front/piston/x [m]"], ["rest", "flight"], bold)
+    before = [heat(1.0), heat(45.0, 0.0, phase="flight"), heat(130.0, channel="hip/q [rad]")]
+    after = [heat(1.1, phase=one.phase, channel=one.channel) for one in before]
+    figure = Figure()
+    draw_heat_maps(figure, {"before": before, "after": after}, columns_of(before))
     first, second, _ = figure.axes
-    assert [text.get_text() for text in first.texts] == ["1.0", "45", "130"]
-    assert [text.get_fontweight() for text in first.texts] == ["normal", "bold", "bold"]
-    assert len(second.texts) == 3
-    assert [label.get_text() for label in second.get_xticklabels()] == ["rest", "flight"]
+    assert first.get_title("left") == "before"
+    shown = [text for text in first.texts if not isinstance(text, Annotation)]
+    assert [text.get_text() for text in shown] == ["1.0", "45", "130"]
+    assert [text.get_fontweight() for text in shown] == ["normal", "bold", "normal"]
+    assert [label.get_text() for label in first.get_yticklabels()] == ["body/z [m]", "hip/q [rad]"]
+    assert sum(not isinstance(text, Annotation) for text in second.texts) == 3
 
 
 def test_conditions_of_several_levels_are_named_once() -> None:
-    conditions = [("flight", "00", "in"), ("flight", "00", "out"), ("flight", "10", "in")]
-    (axes, _) = plot_heat_map({"": np.ones((1, 3))}, ["body/z"], conditions).axes
+    axes = Figure().add_subplot()
+    name_conditions(axes, [("flight", "00", "in"), ("flight", "00", "out"), ("flight", "10", "in")])
     assert [label.get_text() for label in axes.get_xticklabels()] == ["in", "out", "in"]
     outer = {t.get_text(): t.xy[0] for t in axes.texts if isinstance(t, Annotation)}
     assert outer == {"flight": 1.0, "00": 0.5, "10": 2.0}

@@ -15,11 +15,10 @@ from kemba.files import read_json
 from kemba.identify.answer import ENDED, read_answer
 from kemba.mechanism import load_robot
 from kemba.plotting.source import Source, load_machine
-from kemba.report.charts import Track, gather, grid_of, on_grid
+from kemba.report.charts import Track, gather, grid_of, in_plans_clock, on_grid, start_of
 from kemba.report.limits import air_drawn, event_table, motor_share, supply_share
 from kemba.report.model_error import answer_parts
 from kemba.report.motion import Events, events_of
-from kemba.report.plan_clock import in_plans_clock, start_of
 from kemba.report.verdict import of_answer, of_logs, of_plan
 from kemba.runs import PLANT_RUN, load_run, newest_run
 from kemba.trajectory import Trajectory

@@ -38,7 +38,7 @@ def whole_way(task: str | Path, model: str, home: Path, *settings: str) -> dict[
     log = logs / "log-1.csv"
     found["compare"] = run("compare", log, "--model", model)
     out = home / "answer"
-    short = ("--no-figures", "--time-limit", "300")
+    short = ("--no-figure", "--time-limit", "300")
     found["discover"] = run("discover", log, "--model", model, "--out", out, *short)
     return found
 

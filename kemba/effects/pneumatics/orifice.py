@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal
+from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal, at_supply, beyond, filled
 from kemba.effects.pneumatics.flow import (
     ATMOSPHERE,
     CHOKED,
@@ -19,7 +19,6 @@ from kemba.effects.pneumatics.flow import (
     phi,
 )
 from kemba.effects.pneumatics.gas import Air
-from kemba.effects.pneumatics.tables import at_supply, beyond, filled
 from kemba.quantity import Param, Quantity, Tolerance
 
 if TYPE_CHECKING:

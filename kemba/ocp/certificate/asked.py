@@ -96,7 +96,7 @@ def measured(
     refined is measured at its nodes: implicit Euler is coarse between them.
     """
     last_one = "phases" in plan.meta or task.refine != "radau"
-    course = _Course.of(model, requirements if last_one else (), plan)
+    course = _between(model, requirements if last_one else (), plan)
     found = [_on_plan(requirement, task, plan, course) for requirement in _at_nodes(requirements)]
     return (*found, *_of_the_task(model, task, requirements, plan))
 
@@ -150,9 +150,10 @@ def _at_nodes(requirements: Iterable[Requirement]) -> list[Requirement]:
 
 
 def _on_plan(
-    requirement: Requirement, task: Task, plan: Trajectory, course: _Course
+    requirement: Requirement, task: Task, plan: Trajectory, course: Course
 ) -> MeasuredRequirement:
     name, last = requirement.quantity.name, len(plan) - 1
+    times, course_values = course
     exact = task.tolerances.bounds * requirement.scale
     exact += 0.0 if "phases" in plan.meta else requirement.loose
     values = _values(requirement, plan)
@@ -160,15 +161,15 @@ def _on_plan(
         return _worst(requirement, np.array([np.nan]), plan.time[[-1]], exact)
     at = np.array(requirement.nodes(last))
     nodes = _worst(requirement, values[at], plan.time[at], exact, at)
-    if requirement.at is not None or name not in course.values or not nodes.met:
+    if requirement.at is not None or name not in course_values or not nodes.met:
         return nodes
-    inside = (course.time >= plan.time[at[0]]) & (course.time <= plan.time[at[-1]])
+    inside = (times >= plan.time[at[0]]) & (times <= plan.time[at[-1]])
     if not inside.any():
         return nodes
     between = task.tolerances.apex / SCALES["m"] * requirement.scale
-    time = course.time[inside]
+    time = times[inside]
     before = np.searchsorted(plan.time, time) - 1
-    way = _worst(requirement, course.values[name][inside], time, between, before)
+    way = _worst(requirement, course_values[name][inside], time, between, before)
     return way if not way.met or way.miss > nodes.miss else nodes
 
 
@@ -202,36 +203,31 @@ def _worst(
     )
 
 
-@dataclass(frozen=True)
-class _Course:
-    """Lengths and angles between the nodes of a plan: times (n,) [s] and values (n,) by name."""
+Course = tuple[Array, dict[str, Array]]  # times (n,) [s], values (n,) by name
 
-    time: Array
-    values: dict[str, Array]
 
-    @classmethod
-    def of(cls, model: Model, requirements: Iterable[Requirement], plan: Trajectory) -> _Course:
-        """The requirements' lengths and angles on every interval, whose coordinates are cubics."""
-        node = model.node
-        wanted = {
-            r.quantity.name: quantity_expression(model, r.quantity.name)
-            for r in requirements
-            if r.at is None and r.quantity.unit in ("m", "rad")
-        }
-        others = ca.vertcat(node.v, node.s, node.lam, node.u)
-        kept = {n: g for n, g in wanted.items() if not ca.depends_on(ca.SX(g), others)}
-        if not kept:
-            return cls(np.zeros(0), {})
-        x, h = arrays(model, plan), np.diff(plan.time)[:, None]
-        share = np.arange(1, BETWEEN) / BETWEEN
-        q0, q1, end = x["q"][:-1], x["q"][1:], h * x["v"][1:]
-        begin = begin_ways(plan.meta, x["q"], h * x["v"][:-1], end)
-        q = [cubic(q0, q1, begin, end, s) for s in share]
-        time = [plan.time[:-1] + s * h[:, 0] for s in share]
-        f = ca.Function("course", [node.q], [ca.densify(ca.vertcat(*kept.values()))])
-        rows = np.concatenate(q)
-        values = np.array(f.map(len(rows))(rows.T))
-        return cls(np.concatenate(time), dict(zip(kept, values, strict=True)))
+def _between(model: Model, requirements: Iterable[Requirement], plan: Trajectory) -> Course:
+    """The requirements' lengths and angles between the nodes of a plan, whose coordinates are
+    cubics on every interval."""
+    node = model.node
+    wanted = {
+        r.quantity.name: quantity_expression(model, r.quantity.name)
+        for r in requirements
+        if r.at is None and r.quantity.unit in ("m", "rad")
+    }
+    others = ca.vertcat(node.v, node.s, node.lam, node.u)
+    kept = {n: g for n, g in wanted.items() if not ca.depends_on(ca.SX(g), others)}
+    if not kept:
+        return np.zeros(0), {}
+    x, h = arrays(model, plan), np.diff(plan.time)[:, None]
+    share = np.arange(1, BETWEEN) / BETWEEN
+    q0, q1, end = x["q"][:-1], x["q"][1:], h * x["v"][1:]
+    begin = begin_ways(plan.meta, x["q"], h * x["v"][:-1], end)
+    time = [plan.time[:-1] + s * h[:, 0] for s in share]
+    f = ca.Function("course", [node.q], [ca.densify(ca.vertcat(*kept.values()))])
+    rows = np.concatenate([cubic(q0, q1, begin, end, s) for s in share])
+    values = np.array(f.map(len(rows))(rows.T))
+    return np.concatenate(time), dict(zip(kept, values, strict=True))
 
 
 def _of_the_task(

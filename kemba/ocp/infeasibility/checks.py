@@ -14,7 +14,7 @@ from kemba.config import Document
 from kemba.config.document import Location
 from kemba.model import Model
 from kemba.model.rest import at_rest
-from kemba.ocp.infeasibility.diagnostic import (
+from kemba.ocp.infeasibility.explain import (
     Diagnostic,
     key,
     number,

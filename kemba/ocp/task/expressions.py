@@ -7,7 +7,6 @@
 import ast
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -22,18 +21,9 @@ MOMENT = r"\s*at\(\s*([^,()]+?)\s*,\s*((?:[^()]|\([^()]*\))+?)\s*\)\s*"
 TWO_MOMENTS = re.compile(rf"{MOMENT}-{MOMENT}")
 
 
-@dataclass(frozen=True)
-class Difference:
-    """`at(end, body/vx) - at(start, body/vx)`: two expressions and the words for their moments."""
-
-    later: str
-    late: str
-    earlier: str
-    early: str
-
-
-def two_moments(text: str) -> Difference | None:
-    """The two parts of a difference between moments; None where the text has no `at(...)`. Raises
+def two_moments(text: str) -> tuple[str, str, str, str] | None:
+    """The two parts of `at(end, body/vx) - at(start, body/vx)`: the words for the later moment, the
+    expression there, and the same for the earlier one; None where the text has no `at(...)`. Raises
     ValueError where `at(...)` stands in any other form."""
     if not re.search(r"\bat\(", text):
         return None
@@ -41,7 +31,7 @@ def two_moments(text: str) -> Difference | None:
     if match is None:
         raise ValueError(f"'{text}' is not of the form 'at(end, body/x) - at(start, body/x)'")
     late, later, early, earlier = match.groups()
-    return Difference(later, late, earlier, early)
+    return late, later, early, earlier
 
 
 def expressed(text: str, known: Mapping[str, Quantity]) -> Quantity:

@@ -163,10 +163,10 @@ def _requirements(
         during = begin, end
     difference = two_moments(text)
     if difference is not None:
-        later, earlier = (expressed(t, known) for t in (difference.later, difference.earlier))
+        late, early = (share_of(moment, task) for moment in difference[::2])
+        later, earlier = (expressed(part, known) for part in difference[1::2])
         if later.unit != earlier.unit:
             raise ValueError(f"'{text}' takes {earlier.unit} from {later.unit}")
-        late, early = (share_of(m, task) for m in (difference.late, difference.early))
         found = _requirement(task, location, later, late, bound, during)
         yield replace(found, minus=Earlier(earlier.name, early))
         return

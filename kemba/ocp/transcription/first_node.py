@@ -13,6 +13,7 @@ import numpy as np
 
 from kemba.model import Node
 from kemba.model.model import Row
+from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.transcription.layout import Layout
 
 SAME = 1e-9  # relative; far above rounding errors
@@ -27,15 +28,6 @@ class StateRow:
     unit: str
     scale: float
     expression: ca.SX
-
-
-@dataclass(frozen=True)
-class Held:
-    """A requirement that holds exactly at the first node: lower <= g(y) <= upper."""
-
-    g: ca.SX
-    lower: float
-    upper: float
 
 
 def state_rows(
@@ -67,14 +59,14 @@ def _of_the_state(node: Node, g: ca.SX) -> bool:
     return bool(ca.depends_on(g, state) and not ca.depends_on(g, ca.vertcat(*others)))
 
 
-def granted(g: ca.SX, y: ca.SX, layout: Layout, held: Sequence[Held]) -> bool:
-    """Whether g >= 0 follows from one requirement that holds: g is a multiple of its expression
-    and a constant. Such a row would double the requirement, which leaves no unique multipliers."""
+def granted(g: ca.SX, y: ca.SX, layout: Layout, held: Sequence[tuple[ca.SX, Requirement]]) -> bool:
+    """Whether g >= 0 follows from a requirement on an expression that is `held`: g is a multiple of
+    that and a constant. Such a row would double the requirement: no multipliers were unique."""
     rng = np.random.default_rng(0)
     low, high = np.maximum(layout.lower, -1.0), np.minimum(layout.upper, 1.0)
     points = rng.uniform(low, np.maximum(low, high), (3, layout.size)).T
-    for requirement in held:
-        both = ca.vertcat(g, requirement.g)
+    for expression, requirement in held:
+        both = ca.vertcat(g, expression)
         evaluate = ca.Function("both", [y], [both, ca.densify(ca.jacobian(both, y))])
         values, slopes = (np.array(part) for part in evaluate.map(points.shape[1])(points))
         slopes = slopes.reshape(2, -1)

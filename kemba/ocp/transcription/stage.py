@@ -1,13 +1,12 @@
 """One step of implicit Euler as scaled, labelled rows of two neighbouring nodes."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
 from kemba.model import Model
-from kemba.model.model import Row
 from kemba.ocp.task.costs import running
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import CostTerm
@@ -24,18 +23,13 @@ INF = np.inf
 
 @dataclass(frozen=True)
 class StageRows:
-    """Labelled rows lower <= g <= upper of one kind: defect, pair, sign, limit or requirement.
-
-    `unit` and `scale` give the physical size of a violation: scale * g in unit.
-    """
+    """Labelled rows lower <= g <= upper of one kind: defect, pair, sign, limit or requirement."""
 
     kind: str
     g: ca.SX
     lower: float
     upper: float
-    labels: tuple[str, ...]
-    units: tuple[str, ...]
-    scales: tuple[float, ...]
+    labels: Sequence[str]
 
 
 @dataclass(frozen=True)
@@ -72,21 +66,19 @@ def build_stage(
     parts = node.residual.call([*at, now["lam"], now["u"], ca.SX(0, 1)])
     dynamics, rate, pair_a, pair_b, limits = parts
     eps, weights = ca.SX.sym("eps"), ca.SX.sym("weights", 4)
-    a_rows = [node.pair_rows[i][0] for i in reduction.pairs]
-    b_rows = [node.pair_rows[i][1] for i in reduction.pairs]
     a = pair_a[reduction.pairs]
-    b = pair_b[reduction.pairs] / ca.DM([r.scale for r in b_rows])
-    limit_rows = [node.limit_rows[i] for i in reduction.limits]
+    b = pair_b[reduction.pairs] / ca.DM([node.pair_rows[i][1].scale for i in reduction.pairs])
+    pairs = [node.pair_rows[i][0].label for i in reduction.pairs]
+    limited = [node.limit_rows[i].label for i in reduction.limits]
     rows = (
         _kinematics(layout, y0, y, h),
         _momentum(model, layout, reduction, dynamics, h),
         _rates(model, reduction, rate, h),
-        _rows("pair", a * b - eps, [r.label for r in a_rows], [r.unit for r in a_rows], -INF, 0.0),
-        _signs(a, y, layout, a_rows, [1.0] * len(a_rows)),
-        _signs(b, y, layout, b_rows, [r.scale for r in b_rows]),
-        _rows("limit", limits[reduction.limits], [r.label for r in limit_rows],
-              ["1"] * len(limit_rows), 0.0, INF),
-    )  # fmt: skip
+        StageRows("pair", a * b - eps, -INF, 0.0, pairs),
+        _signs(a, y, layout, pairs),
+        _signs(b, y, layout, pairs),
+        StageRows("limit", ca.SX(limits[reduction.limits]), 0.0, INF, limited),
+    )
     own = running(model, cost, now, h) / COST_SCALE
     objective = own + _penalties(layout, y0, y, a * b, weights)
     kept = tuple(r for r in rows if r.g.numel())
@@ -104,36 +96,22 @@ def _penalties(layout: Layout, y0: ca.SX, y: ca.SX, product: ca.SX, weights: ca.
     )
 
 
-def _rows(
-    kind: str,
-    g: ca.SX,
-    labels: Sequence[str],
-    units: Sequence[str],
-    lower: float = 0.0,
-    upper: float = 0.0,
-    scales: Iterable[float] | None = None,
-) -> StageRows:
-    scales = tuple(scales) if scales is not None else (1.0,) * len(labels)
-    return StageRows(kind, ca.SX(g), lower, upper, tuple(labels), tuple(units), scales)
+def _defects(g: ca.SX, labels: Sequence[str]) -> StageRows:
+    return StageRows("defect", ca.SX(g), 0.0, 0.0, labels)
 
 
 def _kinematics(layout: Layout, y0: ca.SX, y: ca.SX, h: ca.SX) -> StageRows:
     kept = layout.quantities["q"]
-    scale = [q.scale for q in kept]
-    g = (layout.half(y, "q") - layout.half(y0, "q") - h * layout.half(y, "v")) / ca.DM(scale)
-    return _rows(
-        "defect", g, [f"kinematics:{q.name}" for q in kept], [q.unit for q in kept], scales=scale
-    )
+    g = layout.half(y, "q") - layout.half(y0, "q") - h * layout.half(y, "v")
+    return _defects(g / ca.DM([q.scale for q in kept]), [f"kinematics:{q.name}" for q in kept])
 
 
 def _momentum(
     model: Model, layout: Layout, reduction: Reduction, dynamics: ca.SX, h: ca.SX
 ) -> StageRows:
     """Equations of motion times the step, projected on the half robot (virtual work)."""
-    kept, g = layout.quantities["q"], project(model, reduction, dynamics) * h / STEP
-    units = ["N" if q.unit == "m" else "N.m" for q in kept]
-    size = [model.mechanism.weight * (1.0 if unit == "N" else ANGLE_ARM) for unit in units]
-    return _rows("defect", g, [f"dynamics:{q.name}" for q in kept], units, scales=size)
+    g = project(model, reduction, dynamics) * h / STEP
+    return _defects(g, [f"dynamics:{q.name}" for q in layout.quantities["q"]])
 
 
 def project(model: Model, reduction: Reduction, dynamics: ca.SX) -> ca.SX:
@@ -148,19 +126,14 @@ def project(model: Model, reduction: Reduction, dynamics: ca.SX) -> ca.SX:
 
 def _rates(model: Model, reduction: Reduction, rate: ca.SX, h: ca.SX) -> StageRows:
     rows = [model.node.rate_rows[i] for i in reduction.rate]
-    scale = [r.scale for r in rows]
-    g = h * rate[reduction.rate] / ca.DM(scale) if rows else ca.SX(0, 1)
-    units = [r.unit.removesuffix(".s-1") for r in rows]
-    return _rows("defect", g, [r.label for r in rows], units, scales=scale)
+    g = h * rate[reduction.rate] / ca.DM([r.scale for r in rows]) if rows else ca.SX(0, 1)
+    return _defects(g, [r.label for r in rows])
 
 
-def _signs(
-    g: ca.SX, y: ca.SX, layout: Layout, rows: Sequence[Row], scales: Sequence[float]
-) -> StageRows:
+def _signs(g: ca.SX, y: ca.SX, layout: Layout, labels: Sequence[str]) -> StageRows:
     """Rows g >= 0, except where g is a variable whose own bound says so."""
     kept = [i for i in range(g.numel()) if not bounded_below(g[i], y, layout)]
-    labels, units = [rows[i].label for i in kept], [rows[i].unit for i in kept]
-    return _rows("sign", g[kept], labels, units, 0.0, INF, [scales[i] for i in kept])
+    return StageRows("sign", g[kept], 0.0, INF, [labels[i] for i in kept])
 
 
 def aim_cost(requirement: Requirement, g: ca.SX) -> ca.SX:
@@ -182,10 +155,9 @@ def as_variable(g: ca.SX, y: ca.SX) -> tuple[int, float, float] | None:
 
 def requirement_row(g: ca.SX, requirement: Requirement) -> StageRows:
     """The row of a requirement on the scalar expression g, in its scale."""
-    scale, ends = requirement.scale, (requirement.lower, requirement.upper)
-    low, high = (end / scale for end in ends)
-    label, unit = (requirement.label,), (requirement.quantity.unit,)
-    return StageRows("requirement", g / scale, low, high, label, unit, (scale,))
+    scale = requirement.scale
+    low, high = (end / scale for end in (requirement.lower, requirement.upper))
+    return StageRows("requirement", g / scale, low, high, [requirement.label])
 
 
 def tighter_bounds(

@@ -27,7 +27,7 @@ from kemba.model import Model
 from kemba.ocp.functions.blocks import RowBlock, block_problem
 from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.first_node import Held, granted, state_rows
+from kemba.ocp.transcription.first_node import granted, state_rows
 from kemba.ocp.transcription.layout import STEP, Layout
 from kemba.ocp.transcription.stage import (
     INF,
@@ -72,12 +72,10 @@ RequirementBlock = tuple[RowBlock, StageRows, list[int]]  # with the nodes at wh
 
 @dataclass(frozen=True)
 class Meaning:
-    """What a row of the program says: kind, label, node, and the size of a violation."""
+    """What a row of the program says: kind, label, node."""
 
     kind: str
     label: str
-    unit: str
-    scale: float
     node: int
 
 
@@ -108,7 +106,7 @@ class Transcription:
         self._rest_before_start()
         stage = self.stage
         index = np.arange((nodes + 1) * self.shape[1]).reshape(self.shape)
-        self.held: list[Held] = []  # requirements that hold exactly at the first node
+        self.held: list[tuple[ca.SX, Requirement]] = []  # what holds exactly at the first node
         moments = self.requirement_blocks(index) + self._first_node_blocks(index)
         moments += self._aims(index) + self._soft_landing(index) + self._between_nodes(index)
         pairs = np.hstack([index[:-1, :n], index[1:, :n]])
@@ -154,7 +152,7 @@ class Transcription:
         """
         if requirement.minus is None:
             if 0 in where:
-                self.held.append(Held(g, requirement.lower, requirement.upper))
+                self.held.append((g, requirement))
             variable = as_variable(g, self.stage.y)
             if variable is not None and self._tighten(where, variable, requirement):
                 return None
@@ -184,7 +182,7 @@ class Transcription:
                 g, stage.y, self.layout, self.held
             ):
                 continue
-            rows = StageRows(row.kind, g, 0.0, INF, (row.label,), (row.unit,), (row.scale,))
+            rows = StageRows(row.kind, g, 0.0, INF, [row.label])
             at = index[[0], : self.layout.size]
             blocks.append((RowBlock(stage.y, rows.g, ca.SX(0), at), rows, [0]))
         return blocks
@@ -193,7 +191,7 @@ class Transcription:
         """The cost of quantities that are to be as large or as small as possible."""
         if not any(r.aim for r in self.requirements):
             return []
-        nothing = StageRows("requirement", ca.SX(0, 1), 0.0, 0.0, (), (), ())
+        nothing = StageRows("requirement", ca.SX(0, 1), 0.0, 0.0, [])
         found: list[RequirementBlock] = []
         for requirement, g, where in self.requirement_expressions():
             if requirement.aim:
@@ -277,10 +275,7 @@ class Transcription:
 
 
 def _meanings(rows: StageRows, node: int) -> list[Meaning]:
-    return [
-        Meaning(rows.kind, label, unit, scale, node)
-        for label, unit, scale in zip(rows.labels, rows.units, rows.scales, strict=True)
-    ]
+    return [Meaning(rows.kind, label, node) for label in rows.labels]
 
 
 SPEED = SCALES["m.s-1"]
@@ -307,6 +302,4 @@ def approach_rows(
         own = felt(model.mechanism, constraint.label)
         rows.append(own * (rate + of_state(constraint.gap) / step) / SPEED)
         labels.append(f"landing.impact_speed:{constraint.label}")
-    units, scales = ("m.s-1",) * len(rows), (SPEED,) * len(rows)
-    low = -speed / SPEED
-    return StageRows("requirement", ca.vertcat(*rows), low, INF, tuple(labels), units, scales)
+    return StageRows("requirement", ca.vertcat(*rows), -speed / SPEED, INF, labels)
