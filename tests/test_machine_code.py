@@ -4,8 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from kemba.identify.robot.physics import SampleMap
-from kemba.machine_code import Native
+from kemba.machine_code import Native, SampleMap
 
 
 def test_rows_are_evaluated_one_by_one() -> None:

@@ -20,7 +20,8 @@ from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
 from kemba.identify.robot.linear import Reference
-from kemba.identify.robot.physics import Physics, SampleMap
+from kemba.identify.robot.physics import Physics
+from kemba.machine_code import SampleMap
 from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
 
