@@ -29,14 +29,13 @@ FAR = 40.0  # other leaders are refitted when not farther behind [nats]
 STRUCTURAL = 1.3
 FAR_SHARE = 0.7  # or no farther behind than this share of the gain
 PROMISING = 0.5  # share of the best gain with which an effect is tried again
-FOLLOWED = 2  # times that the motion is found again with the best guess
+FOLLOWED = 5  # times that the motion is found again with the best answer, at most
 # times that the motion is found before a search along it, until late sensors stay as late: a
 # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
 # second one after it
 SETTLED = 4
 STILL = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
 LARGEST = 10  # effects in one answer: more than any machine is expected to lack
-REGROWN = 3  # times that an answer of several effects is begun again where it has led
 SWAPPED = 2  # rounds in which effects of an answer are taken away or swapped
 LEADERS_GROWN = 3  # effects that are refitted beside the best answer
 LEADERS_SWAPPED = 2  # effects that are refitted in place of one of the answer
@@ -107,34 +106,19 @@ class Search:
         return self._swap(self._grow(best)) if best else best
 
     def _follow(self, best: Hypothesis) -> Hypothesis:
-        """Repeat the search along the motion that the best hypothesis makes, until it stays."""
+        """Repeat the search along the motion that the best hypothesis makes, until it stays: each
+        of its effects changes that motion."""
         for _ in range(FOLLOWED):
             if best == NULL or self.ended:
                 return best
             before = best
-            self._along(best)
-            best = self._round(NULL, LEADERS)
+            self.say(f"searching again with {' + '.join(best)} in the model")
+            self.start(self._settle(best))
+            self.visit(best)
+            best = self._grow(self._round(NULL, LEADERS))
             if best == before:
                 break
-        return self._swap(self._regrow(self._grow(best))) if best else best
-
-    def _along(self, guess: Hypothesis) -> None:
-        """Begin again along the motion that a guess makes of the data."""
-        self.say(f"searching again with {' + '.join(guess)} in the model")
-        self.start(self._settle(guess))
-        self.visit(guess)
-
-    def _regrow(self, best: Hypothesis) -> Hypothesis:
-        """Find the motion again with several effects, each of which changes it, and grow."""
-        for _ in range(REGROWN):
-            if len(best) < 2 or self.ended:
-                break
-            before = best
-            self._along(best)
-            best = self._grow(best)
-            if best == before:
-                break
-        return best
+        return self._swap(best) if best else best
 
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
         """Find the motion of a hypothesis until late sensors stay as late; the best theta."""
