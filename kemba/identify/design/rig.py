@@ -211,9 +211,7 @@ def _plain() -> Iterator[Array]:
         yield np.concatenate([way, early, early, [1.0]])
 
 
-def _best_point(
-    worth: Callable[[Array], float], begin: Array, say: Tell
-) -> tuple[Array, int]:
+def _best_point(worth: Callable[[Array], float], begin: Array, say: Tell) -> tuple[Array, int]:
     """The point (k,) of the unit cube worth most in a search from `begin` (m, k); tries."""
     settings, started = DesignSearchSettings, time.monotonic()
     seen: list[tuple[float, Array]] = []
