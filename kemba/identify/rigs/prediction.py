@@ -10,7 +10,7 @@ from kemba.effects.series import Series
 from kemba.identify.problem.candidates import CompiledModels, OpenModel
 from kemba.identify.problem.problem import Array, Candidate, Theta
 from kemba.identify.problem.sensor_faults import is_fault
-from kemba.identify.rigs.rig_log import ANSWER, PLACE, Filtered, RigLog
+from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.machine_code import SampleMap
 from kemba.model.model import Model
 
@@ -38,7 +38,7 @@ class Balance(OpenModel):
         parts = {"standing": standing, "moving": force - standing, "static": static}
         self._parts = {n: SampleMap(ca.Function(n, symbols, [x])) for n, x in parts.items()}
 
-    def force(self, log: Filtered, values: Mapping[str, float]) -> Array:
+    def force(self, log: RigLog, values: Mapping[str, float]) -> Array:
         """Force (k,) at the judged rows; `values` holds every name of `names`.
 
         The measured force is behind a filter. What bends with the motion is not the same behind the
@@ -58,27 +58,27 @@ class Balance(OpenModel):
             bent += part("static", log.read, v)
         return np.asarray((straight + log.smoothed(bent))[log.rows])
 
-    def slopes(self, log: Filtered, values: Mapping[str, float]) -> Array:
+    def slopes(self, log: RigLog, values: Mapping[str, float]) -> Array:
         """Slopes (k, 1 + inputs) of the force: by the acceleration and by each input."""
         samples, p = self._arguments(log, values)
         return self._slopes([c[log.rows] for c in samples], p)[0]
 
-    def _arguments(self, log: Filtered, values: Mapping[str, float]) -> tuple[list[Array], Array]:
+    def _arguments(self, log: RigLog, values: Mapping[str, float]) -> tuple[list[Array], Array]:
         """States, motion and inputs (n, .) along the whole log, and parameters (k,)."""
         p = self.parameters(values)
         u = np.stack([log.others[name] for name in self.inputs], axis=1)
         return [self._along(log, u, p), *(c[:, None] for c in (log.q, log.v, log.a)), u], p
 
-    def _rate(self, log: Filtered) -> Array:
+    def _rate(self, log: RigLog) -> Array:
         """The rate (n,) of which friction is told."""
         return log.quick if self._drive else log.v
 
-    def _along(self, log: Filtered, u: Array, p: Array) -> Array:
+    def _along(self, log: RigLog, u: Array, p: Array) -> Array:
         """States (n, ns) along the whole log; each stretch begins at rest."""
         parts, whole = [], np.column_stack([log.q, self._rate(log), log.a, u])
-        for begin, end in zip(log.begins, np.append(log.begins[1:], len(log.time)), strict=True):
+        for begin, end in zip(log.begins, np.append(log.begins[1:], len(log.grid)), strict=True):
             own = whole[begin:end]
-            middle = np.column_stack([np.diff(log.time[begin:end]), 0.5 * (own[1:] + own[:-1])])
+            middle = np.column_stack([np.diff(log.grid[begin:end]), 0.5 * (own[1:] + own[:-1])])
             start = self.along.rest(log.q[begin], 0.0, 0.0, u[begin], p)
             parts.append(self.along.run(start, middle, p)[0])
         return np.concatenate(parts)
@@ -101,12 +101,12 @@ class Predictor(CompiledModels[Balance]):
 
     def gap(self, log: RigLog, theta: Theta) -> Array:
         """Predicted less measured force (k,) at the judged rows."""
-        channels, time = self.true(log.channels, theta), log.time
-        expected = self.at(theta).force(channels, self.values(theta))
-        measured = channels.others[self.answer][channels.rows]
+        log = self.true(log, theta)
+        expected = self.at(theta).force(log, self.values(theta))
+        measured = log.others[self.answer][log.rows]
         if self.answer in self.at(theta).inputs:  # in the unit of what the motor was told
             return np.asarray((expected - measured) / self._gain(theta))
-        shown = self.sensors.shown(theta, self.answer, Series(time, expected))
+        shown = self.sensors.shown(theta, self.answer, Series(log.time, expected))
         return np.asarray(shown.value - measured)
 
     def _gain(self, theta: Theta) -> float:
@@ -118,26 +118,25 @@ class Predictor(CompiledModels[Balance]):
     def variance(self, log: RigLog, usual: float) -> Array:
         """Variance (k,) of `gap` under the model as it is; friction of the size `usual` is in doubt
         where the sign of the rate is."""
-        channels = log.channels
-        slopes = self.at({}).slopes(channels, self.values({}))
-        sigmas = [channels.a_sigma, *(channels.sigma[n] for n in self.at({}).inputs)]
+        slopes = self.at({}).slopes(log, self.values({}))
+        sigmas = [log.a_sigma, *(log.sigma[n] for n in self.at({}).inputs)]
         noise = (slopes * sigmas) ** 2
         total = noise.sum(axis=1) + (usual * log.doubt) ** 2
         if self.answer not in self.at({}).inputs:
-            total = total + channels.sigma[self.answer] ** 2
+            total = total + log.sigma[self.answer] ** 2
         else:  # the motor's force enters once: as what was measured, in whose unit all else counts
             others = (total - noise[:, -1]) / self._gain({}) ** 2
-            total = others + channels.sigma[self.answer] ** 2
+            total = others + log.sigma[self.answer] ** 2
         return np.asarray(total)
 
-    def true(self, log: Filtered, theta: Theta) -> Filtered:
+    def true(self, log: RigLog, theta: Theta) -> RigLog:
         """The channels without the faults of their sensors, but for the one that is predicted."""
         if not self.sensors.present and not any(is_fault(name) for name in theta):
             return log
-        seen = Series(log.time, log.q, (log.v, log.a))
+        seen = Series(log.grid, log.q, (log.v, log.a))
         moved = self.sensors.behind(theta, self.place, seen)
         others = {
-            name: self.sensors.behind(theta, name, Series(log.time, y)).value
+            name: self.sensors.behind(theta, name, Series(log.grid, y)).value
             for name, y in log.others.items()
             if name != self.answer
         }
