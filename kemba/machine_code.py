@@ -80,16 +80,14 @@ class Native:
 
 
 class SampleMap:
-    """A function of samples; the answers are those of CasADi's own machine."""
+    """Functions of samples, the `outputs` as expressions of the symbols `inputs`; the answers are
+    those of CasADi's own machine."""
 
-    def __init__(self, function: ca.Function) -> None:
-        given = function.sx_in()
-        outputs = function.call(given)
-        self._name = function.name()
-        self._widths = [symbol.numel() for symbol in given]
+    def __init__(self, inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> None:
+        self._widths = [symbol.numel() for symbol in inputs]
         self._shapes = [output.shape for output in outputs]
         by_rows = [ca.reshape(output.T, output.numel(), 1) for output in outputs]
-        self._code = Native(given, {self._name: [ca.vertcat(*by_rows)]})
+        self._code = Native(inputs, {"map": [ca.vertcat(*by_rows)]})
 
     def __call__(self, samples: Sequence[Array], p: Array | None = None) -> list[Array]:
         """Arrays (N, rows[, columns]) from samples (N, .); `p` (k,): last input of all."""
@@ -100,7 +98,7 @@ class SampleMap:
         for values, first, end in zip(given, edges[:-1], edges[1:], strict=True):
             x[:, first:end] = values
         y = np.zeros((count, sum(rows * columns for rows, columns in self._shapes)))
-        self._code.rows(self._name, x, y)
+        self._code.rows("map", x, y)
         ends = np.cumsum([rows * columns for rows, columns in self._shapes])
         blocks = np.split(y, ends[:-1], axis=1)
         return [

@@ -46,7 +46,7 @@ class RigModel(OpenModel):
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.u).T)
-        self._output = SampleMap(ca.Function("output", inputs, [results]))
+        self._output = SampleMap(inputs, [results])
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""

@@ -30,13 +30,13 @@ class Balance(OpenModel):
         force = node.dynamics[0] + node.u[0] if self._drive else node.outputs["piston/F"]
         symbols = [node.s, node.q, node.v, node.a, node.u, node.p]
         slopes = ca.horzcat(ca.jacobian(force, node.a), ca.jacobian(force, node.u))
-        self._slopes = SampleMap(ca.Function("slopes", symbols, [slopes.T]))
+        self._slopes = SampleMap(symbols, [slopes.T])
         moving = ca.vertcat(node.s, node.v)
         standing = ca.substitute(force, moving, ca.DM.zeros(moving.shape))
         static = ca.substitute(standing, node.a, ca.DM(0.0))
         self._bends = bool(ca.which_depends(static, node.q, 2, True)[0])
         parts = {"standing": standing, "moving": force - standing, "static": static}
-        self._parts = {n: SampleMap(ca.Function(n, symbols, [x])) for n, x in parts.items()}
+        self._parts = {n: SampleMap(symbols, [x]) for n, x in parts.items()}
 
     def force(self, log: RigLog, values: Mapping[str, float]) -> Array:
         """Force (k,) at the judged rows; `values` holds every name of `names`.

@@ -102,15 +102,17 @@ class Physics:
         return tuple(c.name for c in self.mechanism.coordinates[: 3 + len(self.legs)]) + pistons
 
     @cached_property
-    def functions(self) -> dict[str, ca.Function]:
-        """All functions of samples, by name."""
+    def functions(self) -> dict[str, tuple[list[ca.SX], list[ca.SX]]]:
+        """Inputs and outputs of all functions of samples, by name."""
         node = self.node
         r = self._force
         full = [node.q, node.v, node.a, node.s, node.u, self.p]
         y = ca.vertcat(*(node.outputs[name] for name in self.channels))
         feet, feet_rate, feet_slope = self._feet()
         motion = [node.q, node.v, self.p]
-        named = {
+        regress = link_regressors(self.mechanism)
+        coordinates = regress.sx_in()
+        return {
             "residual": (full, [r]),
             "mass": (full, [ca.jacobian(r, node.a)]),
             "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
@@ -118,10 +120,8 @@ class Physics:
             "measured": (motion, [y, ca.jtimes(y, node.q, node.v), ca.jacobian(y, node.q)]),
             "feet": (motion, [feet, feet_rate, feet_slope]),
             "seen": (motion, [y, feet]),
+            "links": (coordinates, regress.call(coordinates)),
         }
-        made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
-        made["links"] = link_regressors(self.mechanism)
-        return made
 
     def _feet(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Of feet: x and distance from the ground; rates, slopes along it and out of it."""
@@ -170,7 +170,7 @@ class Physics:
     def call(self, name: str, *samples: Array, p: Array | None = None) -> list[Array]:
         """Function `name` over samples (N, .): arrays (N, rows) or (N, rows, columns)."""
         if name not in self._maps:
-            self._maps[name] = SampleMap(self.functions[name])
+            self._maps[name] = SampleMap(*self.functions[name])
         return self._maps[name](samples, p)
 
     def knees(self, pistons: Array, p: Array) -> Array:
