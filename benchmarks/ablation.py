@@ -96,8 +96,6 @@ def _differs(result: Any, search: Any, best: Any, *_: Any) -> bool:
 
 SEARCH, PARSIMONY, FORMULA = "infer.search:Search.", "infer.selection:", "infer.formula"
 RULES = [
-    Rule("begun again", SEARCH + "_regrow", lambda s, best: best,
-         lambda result, s, best: len(best) > 1),
     Rule("late sensors stay", SEARCH + "_settle", once,
          lambda result, s, h: bool(s.problem.held_back(result))),
     Rule("swaps", SEARCH + "_swap", lambda s, best: best, _differs),

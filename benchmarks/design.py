@@ -9,12 +9,14 @@ the twin does it, and the evidence between both is measured. Finished cases are 
 """
 
 import argparse
+import math
 import os
 import sys
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,7 +26,7 @@ from blind import report
 from rehearsal import FIRST, Machine, fitted, measured_evidence, problem_of
 
 from kemba.identify.design.rig import design_rig_test
-from kemba.identify.design.separation import ExperimentSettings, JudgedTest
+from kemba.identify.design.separation import DesignSearchSettings, ExperimentSettings, JudgedTest
 from kemba.model.spec import load_model
 from kemba.scenarios.share import wilson
 
@@ -55,7 +57,8 @@ def run(truth: str, other: str, seed: int) -> dict[str, Any]:
         first = problem_of(machine.done(FIRST, stroke, folder), model)
         rivals = fitted(first, (truth, other))
         before = measured_evidence(first, rivals, truth, other)
-        design = design_rig_test(model, rivals, bounded=False)
+        with patch.object(DesignSearchSettings, "budget", math.inf):
+            design = design_rig_test(model, rivals)
         seconds = time.process_time() - started
         assert design is not None
 

@@ -79,6 +79,34 @@ class Native:
         call(self.address[name])(*places)
 
 
+class SampleMap:
+    """Functions of samples, the `outputs` as expressions of the symbols `inputs`; the answers are
+    those of CasADi's own machine."""
+
+    def __init__(self, inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> None:
+        self._widths = [symbol.numel() for symbol in inputs]
+        self._shapes = [output.shape for output in outputs]
+        by_rows = [ca.reshape(output.T, output.numel(), 1) for output in outputs]
+        self._code = Native(inputs, {"map": [ca.vertcat(*by_rows)]})
+
+    def __call__(self, samples: Sequence[Array], p: Array | None = None) -> list[Array]:
+        """Arrays (N, rows[, columns]) from samples (N, .); `p` (k,): last input of all."""
+        given = [*samples] if p is None else [*samples, p]
+        count = len(samples[0])
+        x = np.empty((count, sum(self._widths)))
+        edges = np.cumsum([0, *self._widths])
+        for values, first, end in zip(given, edges[:-1], edges[1:], strict=True):
+            x[:, first:end] = values
+        y = np.zeros((count, sum(rows * columns for rows, columns in self._shapes)))
+        self._code.rows("map", x, y)
+        ends = np.cumsum([rows * columns for rows, columns in self._shapes])
+        blocks = np.split(y, ends[:-1], axis=1)
+        return [
+            block if columns == 1 else block.reshape(count, rows, columns)
+            for block, (rows, columns) in zip(blocks, self._shapes, strict=True)
+        ]
+
+
 @lru_cache(maxsize=64)
 def _compiled(assembly: str) -> Any:
     """LLVM's engine that holds the code. Models that differ in a figure share most functions."""

@@ -4,8 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from kemba.identify.robot.physics import SampleMap
-from kemba.machine_code import Native
+from kemba.machine_code import Native, SampleMap
 
 
 def test_rows_are_evaluated_one_by_one() -> None:
@@ -55,9 +54,10 @@ def test_rows_must_lie_in_one_piece() -> None:
 def test_a_map_over_samples_keeps_the_shapes() -> None:
     q, p = ca.SX.sym("q", 2), ca.SX.sym("p", 3)
     y = ca.vertcat(q[0] * p[0], ca.cos(q[1]), p[2])
-    f = ca.Function("f", [q, p], [y, ca.jacobian(y, q)])
+    outputs = [y, ca.jacobian(y, q)]
+    f = ca.Function("f", [q, p], outputs)
     samples, figures = np.random.default_rng(2).standard_normal((4, 2)), np.array([1.0, 2.0, 3.0])
-    values, slopes = SampleMap(f)([samples], figures)
+    values, slopes = SampleMap([q, p], outputs)([samples], figures)
     assert values.shape == (4, 3) and slopes.shape == (4, 3, 2)
     for row, value, slope in zip(samples, values, slopes, strict=True):
         wanted = f(row, figures)

@@ -112,12 +112,12 @@ def least_squares(learnt: Sequence[Path], kept: Sequence[Path]) -> float:
         rows, forces = [], []
         problem = rig_problem(read_logs(paths), model)
         for log in problem.logs:
-            c, sure = log.channels, log.doubt < SURE
-            at = c.rows[sure]
-            push = problem.predictor.gap(log, {})[sure] + c.others["piston/F"][at]
-            z = np.tanh(c.v[at] / model.mechanism.sign_speed)
+            sure = log.doubt < SURE
+            at = log.rows[sure]
+            push = problem.predictor.gap(log, {})[sure] + log.others["piston/F"][at]
+            z = np.tanh(log.v[at] / model.mechanism.sign_speed)
             rows.append(np.stack([push, -z, -np.abs(push) * z], axis=1))
-            forces.append(c.others["piston/F"][at])
+            forces.append(log.others["piston/F"][at])
         return np.concatenate(rows), np.concatenate(forces)
 
     a, y = columns(learnt)

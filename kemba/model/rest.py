@@ -11,13 +11,16 @@ from weakref import WeakKeyDictionary
 
 import casadi as ca
 import numpy as np
+from typing_extensions import Self
 
 from kemba.errors import KembaError
+from kemba.machine_code import Native
 from kemba.model.model import Model, Node
 from kemba.quantity import Quantity
 from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Index = np.ndarray[Any, np.dtype[np.int_]]
 
 
 # s; time after which states count as at rest; a leak would empty any tank in the end (ten times
@@ -170,32 +173,55 @@ def _mean_growth(h: ca.SX, slope: ca.SX, stiff: ca.SX) -> ca.SX:
     return h * slope * ca.if_else(small, 0.5 + z / 6, (ca.exp(z) - 1 - z) / safe**2)
 
 
-CHUNK = 512  # steps per call of the compiled function
-
-
 class StatesAlong:
-    """The states of a model's `node`, step by step. `rest`: where they come to rest, by coordinate,
-    its rate and acceleration, inputs and parameters that are held."""
+    """The states (ns,) of effects along what is given: ds/dt = rate(s, *held), step by step.
 
-    def __init__(self, model: Model, node: Node) -> None:
-        held, rate = [node.q, node.v, node.a, node.u, node.p], rate_of(node)
-        self.rest = Rest(node.s, held, rate, list(model.states.values()))
-        sizes = [1, *(symbol.numel() for symbol in held[:-1])]
-        self.width = sum(sizes)
-        d = ca.SX.sym("d", self.width)
-        h, *given = ca.vertsplit(d, np.cumsum([0, *sizes]).tolist())
-        after, _ = midpoint_step(rate, node.s, held, [*given, node.p], h)
-        step = ca.Function("step", [node.s, d, node.p], [ca.densify(after)], {"cse": True})
-        self._steps = Buffered(step.mapaccum(CHUNK))
+    `held`: what each step has in its middle, such as coordinates and inputs, and last the
+    parameters, which are the same in all steps. `rest`: where the states come to rest with all of
+    these held.
+    """
 
-    def run(self, start: Array, given: Array, p: Array) -> Array:
-        """States (ns, n + 1) from `start` (ns,) over n steps, at parameters p (k,). `given`
-        (width, n): length [s] of each step; coordinates, rates, accelerations and inputs in its
-        middle."""
-        n = given.shape[1]
-        given = np.pad(given, ((0, 0), (0, -n % CHUNK)))  # steps of no length at the end
-        fixed, states = np.repeat(p[:, None], CHUNK, axis=1), [start[:, None]]
-        for i in range(0, given.shape[1], CHUNK):
-            (found,) = self._steps(states[-1][:, -1], given[:, i : i + CHUNK], fixed)
-            states.append(found.copy())
-        return np.concatenate(states, axis=1)[:, : n + 1]
+    def __init__(
+        self, s: ca.SX, held: Sequence[ca.SX], rate: ca.SX, quantities: Sequence[Quantity]
+    ) -> None:
+        self.rest = Rest(s, held, rate, quantities)
+        self._s, self._held, self._rate = s, list(held), rate
+        self.width = 1 + sum(symbol.numel() for symbol in held[:-1])  # of what is given
+        self._codes: dict[bytes, Native] = {}
+
+    @classmethod
+    def of(cls, model: Model, node: Node) -> Self:
+        """Those of a model along coordinates, their rates and accelerations, and inputs."""
+        held = [node.q, node.v, node.a, node.u, node.p]
+        return cls(node.s, held, rate_of(node), list(model.states.values()))
+
+    def run(
+        self, start: Array, given: Array, p: Array, among: Index | None = None
+    ) -> tuple[Array, Array]:
+        """States (n + 1, ns) from `start` (ns,) over n steps, and their means (n, ns) over these.
+
+        `given` (n, width): length [s] of each step, and what is held over it; `p` (k,): parameters.
+        `among`: states that are asked for, and that depend on no others (None: all); the others
+        stay where they start.
+        """
+        own, n = np.arange(len(start)) if among is None else among, len(given)
+        after, means = np.tile(start, (n + 1, 1)), np.tile(start, (n, 1))
+        if not len(own):
+            return after, means
+        known = np.hstack([given, np.broadcast_to(p, (n, len(p)))])
+        x = np.zeros((n + 1, len(own) + known.shape[1]))
+        x[0, : len(own)], x[:-1, len(own) :] = start[own], known
+        mean = np.zeros((n, len(own)))
+        # each step begins where the one before has ended
+        self._code(own).rows("step", x[:-1], x[1:, : len(own)], mean)
+        after[:, own], means[:, own] = x[:, : len(own)], mean
+        return after, means
+
+    def _code(self, own: Index) -> Native:
+        """A step of these states."""
+        key = own.tobytes()
+        if key not in self._codes:
+            h, at = ca.SX.sym("h"), own.tolist()
+            step = midpoint_step(self._rate[at], self._s[at], self._held, self._held, h)
+            self._codes[key] = Native([self._s[at], h, *self._held], {"step": step})
+        return self._codes[key]

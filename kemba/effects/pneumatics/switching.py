@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
+Labels = np.ndarray[Any, np.dtype[np.int_]]
 Pulse = tuple[float, float]  # a valve is on from the first instant to the second [s]
 
 ON = 0.5  # a command above this is on
@@ -61,6 +62,16 @@ def changes(of: Iterable[Pulse] | Array) -> tuple[Array, Array]:
     signs = np.tile([1.0, -1.0], len(flat) // 2)
     known = np.isfinite(flat)
     return flat[known], signs[known]
+
+
+def cut(times: Array, events: Array) -> tuple[Array, Labels]:
+    """Times (m,) of samples at `times` (n,) and of `events` between them, in order, and the places
+    (n,) of the samples among these."""
+    whole = np.concatenate([times, np.clip(events, times[0], times[-1])])
+    order = np.argsort(whole, kind="stable")
+    place = np.empty(len(order), dtype=int)
+    place[order] = np.arange(len(order))
+    return whole[order], place[: len(times)]
 
 
 def is_on(acting: Array, times: Array) -> Array:

@@ -3,22 +3,20 @@ rig's chambers are driven by the imposed motion."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from kemba.effects.pneumatics.flow import ATMOSPHERE
-from kemba.effects.pneumatics.switching import delayed, instants, is_on
+from kemba.effects.pneumatics.switching import cut, delayed, instants, is_on
 from kemba.effects.series import Series
 from kemba.identify.bench.bench_log import PRESSURES, BenchLog, Pulses, SmoothedMotion
 from kemba.identify.bench.clocks import commands_by_one_clock, motion_by_one_clock
-from kemba.identify.problem.candidates import CompiledModels, nominal_figures
+from kemba.identify.problem.candidates import CompiledModels, OpenModel
 from kemba.identify.problem.problem import Array, Candidate, Theta
-from kemba.identify.problem.sensor_faults import SensorFaults
+from kemba.machine_code import SampleMap
 from kemba.mechanism import Cylinder
 from kemba.model.model import Model
-from kemba.model.rest import Buffered, StatesAlong
 
 # The velocity is known within v_sigma: the force is its mean over three Gauss-Hermite nodes
 V_NODES, V_MIDDLE = ((-np.sqrt(3.0), 1 / 6), (np.sqrt(3.0), 1 / 6)), 2 / 3  # sigma, weight
@@ -39,19 +37,16 @@ class Prediction:
     states: dict[str, Array]
 
 
-class RigModel:
-    """One model compiled with some numbers left open: `free` parameters, `scaled` tables."""
+class RigModel(OpenModel):
+    """A piston on a bench: its force, and its slopes by the valves."""
 
     def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
-        self.model, self.names = model, (*free, *scaled)
-        node = model.build(free, scaled)
-        self.state_names = tuple(q.name for q in model.states.values())
-        self._along = StatesAlong(model, node)
+        super().__init__(model, free, scaled)
+        node, self.state_names = self.node, tuple(q.name for q in model.states.values())
         inputs = [node.s, node.q, node.v, node.a, node.u, node.p]
         force = node.outputs["piston/F"]
         results = ca.vertcat(force, ca.jacobian(force, node.u).T)
-        self._output = ca.Function("output", inputs, [ca.densify(results)])
-        self._maps: dict[int, Buffered] = {}
+        self._output = SampleMap(inputs, [results])
 
     def timing(self, values: Mapping[str, float]) -> tuple[float, float]:
         """Seconds by which the valves switch on and off late, with these parameters."""
@@ -74,45 +69,41 @@ class RigModel:
         """
         on, off = self.timing(values)
         valves = [delayed(c, on, off) for c in commands]
-        p = np.array([values[name] for name in self.names])
+        p = self.parameters(values)
         seen = motion.time - late
-        times, at_sample = _breakpoints(seen, np.concatenate([instants(v) for v in valves]))
+        events = [*(instants(v) for v in valves), _substeps(seen)]
+        times, at_sample = cut(seen, np.concatenate(events))
         u = np.stack([is_on(v, times) for v in valves])
-        begin = self._along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
+        begin = self.along.rest(motion.x[0], 0.0, 0.0, u[:, 0], p)
         begin += np.array([(start or {}).get(name, 0.0) for name in self.state_names])
         middle = 0.5 * (times[:-1] + times[1:])
         along = [np.interp(middle, motion.time, c) for c in (motion.x, motion.v, motion.a)]
-        driven = np.stack([np.diff(times), *along, *u[:, :-1]])
-        s = self._along.run(begin, driven, p)[:, at_sample]
-        blurred = np.stack([share(v, seen) for v in valves])
-        n, moved = len(seen), Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
+        driven = np.stack([np.diff(times), *along, *u[:, :-1]], axis=1)
+        s = self.along.run(begin, driven, p)[0][at_sample]
+        blurred = np.stack([share(v, seen) for v in valves], axis=1)
+        moved = Series(motion.time, motion.x, (motion.v, motion.a)).late(late)
         x, (v0, a) = moved.value, moved.rates
-        fixed = np.repeat(p[:, None], n, axis=1)
-        states = dict(zip(self.state_names, s, strict=True))
-        if n not in self._maps:
-            self._maps[n] = Buffered(self._output.map(n))
-        mapped = self._maps[n]
-        out = mapped(s, x, v0, a, blurred, fixed)[0].copy()
-        force = V_MIDDLE * out[0]
+
+        def output(v: Array) -> Array:
+            """Force, and its slopes by the valves (n, 3), at a velocity (n,)."""
+            return self._output([s, x[:, None], v[:, None], a[:, None], blurred], p)[0]
+
+        out = output(v0)
+        force = V_MIDDLE * out[:, 0]
         for place, weight in V_NODES:
-            v = v0 + place * motion.v_sigma
-            force += weight * mapped(s, x, v, a, blurred, fixed)[0][0]
-        return Prediction(force, out[1:3].T, blurred.T, states)
+            force += weight * output(v0 + place * motion.v_sigma)[:, 0]
+        states = dict(zip(self.state_names, s.T, strict=True))
+        return Prediction(force, out[:, 1:], blurred, states)
 
 
-def _breakpoints(samples: Array, events: Array) -> tuple[Array, Any]:
-    """Times (m,) of samples, switchings and sub-steps, and places (n,) of samples."""
-    inside = np.clip(events, samples[0], samples[-1])
+def _substeps(samples: Array) -> Array:
+    """Times (m,) between samples (n,) that are farther apart than the longest step."""
     pieces = np.ceil(np.diff(samples) / STEP - 1e-6).astype(int)
     fill = [
         np.linspace(samples[i], samples[i + 1], pieces[i] + 1)[1:-1]
         for i in np.flatnonzero(pieces > 1)
     ]
-    times = np.concatenate([samples, inside, *fill])
-    order = np.argsort(times, kind="stable")
-    place = np.empty(len(times), dtype=int)
-    place[order] = np.arange(len(times))
-    return times[order], place[: len(samples)]
+    return np.concatenate([[], *fill])
 
 
 def share(intervals: Array, times: Array) -> Array:
@@ -140,8 +131,7 @@ class BenchPredictor(CompiledModels[RigModel]):
     exact = False
 
     def __init__(self, model: Model, candidates: Mapping[str, Candidate]) -> None:
-        super().__init__(model, candidates, nominal_figures(model), RigModel)
-        self.sensors = SensorFaults(model.effects)
+        super().__init__(model, candidates, RigModel)
 
     def predict(
         self, run: BenchLog, theta: Theta, start: Mapping[str, float] | None = None
@@ -149,8 +139,8 @@ class BenchPredictor(CompiledModels[RigModel]):
         """What happens on the rig, before any sensor; where `exact`, at the times that the force of
         a row is of. `start`: by how much states differ from rest when the log begins."""
         rig, sent, late = self.at(theta), self.sent(run, theta), self._shift(theta)
-        values = self.values(theta, rig.names)
-        return rig.predict(self.true_motion(run, theta), sent.commands, values, start or {}, late)
+        motion, values = self.true_motion(run, theta), self.values(theta)
+        return rig.predict(motion, sent.commands, values, start or {}, late)
 
     def _shift(self, theta: Theta) -> float:
         """Seconds before every row at which the rig is predicted."""

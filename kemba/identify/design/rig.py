@@ -211,15 +211,13 @@ def _plain() -> Iterator[Array]:
         yield np.concatenate([way, early, early, [1.0]])
 
 
-def _best_point(
-    worth: Callable[[Array], float], begin: Array, say: Tell, bounded: bool
-) -> tuple[Array, int]:
+def _best_point(worth: Callable[[Array], float], begin: Array, say: Tell) -> tuple[Array, int]:
     """The point (k,) of the unit cube worth most in a search from `begin` (m, k); tries."""
     settings, started = DesignSearchSettings, time.monotonic()
     seen: list[tuple[float, Array]] = []
 
     def cost(point: Array) -> float:
-        if seen and bounded and time.monotonic() - started > settings.budget:
+        if seen and time.monotonic() - started > settings.budget:
             return 0.0
         value = worth(np.asarray(point))
         seen.append((value if np.isfinite(value) else 0.0, np.array(point)))
@@ -279,17 +277,9 @@ class RigDesign(Proposal):
         return found
 
 
-def design_rig_test(
-    model: Model,
-    rivals: Rivals,
-    say: Tell = silent,
-    bounded: bool = True,
-) -> RigDesign | None:
-    """The test of the piston of `model` that tells the rivals apart best; `bounded`: in about a
-    minute.
-
-    None where a rig cannot show two of them.
-    """
+def design_rig_test(model: Model, rivals: Rivals, say: Tell = silent) -> RigDesign | None:
+    """The test of the piston of `model` that tells the rivals apart best, found in about a minute;
+    None where a rig cannot show two of them."""
     bench = VirtualBench(model, ExperimentSettings.rows)
     coarse = VirtualBench(model, ExperimentSettings.coarse)
     say("judging the standard tests")
@@ -306,7 +296,7 @@ def design_rig_test(
 
     search = DesignSearchSettings
     say(f"designing a test of {duration:.1f} s")
-    point, tried = _best_point(worth, beginnings(search.members, search.seed), say, bounded)
+    point, tried = _best_point(worth, beginnings(search.members, search.seed), say)
     rig = course(point, duration, bench.stroke)
     say("fitting the rivals to what the tests would measure")
     before, after = (_confirmed(bench, r, rivals) for r in (standard.test, rig))
@@ -329,14 +319,9 @@ def _confirmed(bench: VirtualBench, rig: Rig, rivals: Rivals) -> JudgedTest:
     return bench.judged(rig, Separation(first, nats))
 
 
-def propose(
-    folder: str | Path,
-    out: Path,
-    say: Tell = silent,
-    bounded: bool = True,
-) -> RigDesign:
+def propose(folder: str | Path, out: Path, say: Tell = silent) -> RigDesign:
     """The test of a rig that best tells the possible effects of an answer in `folder` apart, a YAML
-    in `out`. `bounded`: in about a minute. `say` gets what is being done.
+    in `out`, found in about a minute. `say` gets what is being done.
 
     Raises KembaError where no test shows a difference, or a file cannot be read or written.
     """
@@ -347,7 +332,7 @@ def propose(
         what = f"its model {model.name} is a rig of your own, of kind {model.mechanism.rig}"
         hint = "tests are designed for a piston with valves and for the robot only"
         raise KembaError(str(folder), what, hint=hint)
-    found = design_rig_test(model, rivals, say, bounded)
+    found = design_rig_test(model, rivals, say)
     if found is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no rig test shows a difference between {names}")

@@ -152,7 +152,7 @@ class Tried(JudgedTest):
 
 
 def _design_motion(
-    model: Model, rivals: Rivals, say: Tell, bounded: bool
+    model: Model, rivals: Rivals, say: Tell
 ) -> tuple[Tried, list[Tried], int] | None:
     """The standard sway, all safe ones, the best first, and how many were simulated."""
     if len(model.mechanism.legs) < 2:
@@ -166,7 +166,7 @@ def _design_motion(
     cube = qmc.Sobol(4, rng=search.seed).random_base2(int(np.ceil(np.log2(even))))
     points = {STANDARD: np.full(4, 0.5)}
     while count < TRIED:  # the standard, some that fill the range, some near the best
-        if bounded and count >= LEAST_TRIED and time.monotonic() - started > search.budget:
+        if count >= LEAST_TRIED and time.monotonic() - started > search.budget:
             break
         if count <= even:
             point = cube[count - 1]
@@ -291,23 +291,16 @@ class MotionProposal(Proposal):
         return expected(self.model, done, self.rivals).least
 
 
-def propose_motion(
-    folder: str | Path,
-    out: Path,
-    say: Tell = silent,
-    bounded: bool = True,
-) -> MotionProposal:
-    """The safe motion that best tells the possible effects of an answer apart, a task in `out`.
-
-    `bounded`: in about a minute. Raises KembaError where no motion shows a difference, or a file
-    cannot be read or written.
-    """
+def propose_motion(folder: str | Path, out: Path, say: Tell = silent) -> MotionProposal:
+    """The safe motion that best tells the possible effects of an answer apart, a task in `out`,
+    found in about a minute. Raises KembaError where no motion shows a difference, or a file cannot
+    be read or written."""
     answer = read_answer(folder)
     rivals, base = contenders(answer), str(answer.get("base") or "planning")
     model = load_model(base)
     if model.mechanism.rig or not model.mechanism.robot:
         raise KembaError(str(folder), f"its model {model.name} is no robot")
-    design = _design_motion(model, rivals, say, bounded)
+    design = _design_motion(model, rivals, say)
     if design is None:
         names = ", ".join(rivals.names)
         raise KembaError(str(folder), f"no log of the robot shows a difference between {names}")

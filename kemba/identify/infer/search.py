@@ -28,15 +28,13 @@ FAR = 40.0  # other leaders are refitted when not farther behind [nats]
 # its linear evidence is
 STRUCTURAL = 1.3
 FAR_SHARE = 0.7  # or no farther behind than this share of the gain
-PROMISING = 0.5  # share of the best gain with which an effect is tried again
-FOLLOWED = 2  # times that the motion is found again with the best guess
+FOLLOWED = 5  # times that the motion is found again with the best answer, at most
 # times that the motion is found before a search along it, until late sensors stay as late: a
 # piston 5.2 ms late is found 3.2 ms late along the motion as it is read, 5.2 ms along the
 # second one after it
 SETTLED = 4
 STILL = 0.1  # change of such a delay, in rows, at which it stays: below its 1 sigma
 LARGEST = 10  # effects in one answer: more than any machine is expected to lack
-REGROWN = 3  # times that an answer of several effects is begun again where it has led
 SWAPPED = 2  # rounds in which effects of an answer are taken away or swapped
 LEADERS_GROWN = 3  # effects that are refitted beside the best answer
 LEADERS_SWAPPED = 2  # effects that are refitted in place of one of the answer
@@ -90,51 +88,27 @@ class Search:
         return best
 
     def further(self, best: Hypothesis) -> Hypothesis:
-        """The likeliest hypothesis, searched for from the first guess."""
-        if self.problem.moves:
-            return self._follow(best)
-        if best != NULL:
-            null = self.points[NULL].log_evidence
-            gains = {h: p.log_evidence - null for h, p in self.points.items() if h}
-            least = PROMISING * max(gains.values())
-            promising = [h for h, gain in gains.items() if gain > least]
-            self.base.seen_from(self.points[best].fit.theta)
-            self.problem = self.base.problem
-            self.points = {NULL: self.base.point}
-            for number, hypothesis in enumerate(promising, start=1):
-                self.visit(hypothesis, number, len(promising))
-            best = self._round(NULL, LEADERS)
-        return self._swap(self._grow(best)) if best else best
-
-    def _follow(self, best: Hypothesis) -> Hypothesis:
-        """Repeat the search along the motion that the best hypothesis makes, until it stays."""
-        for _ in range(FOLLOWED):
+        """The likeliest hypothesis, searched for from the first guess: again with what it tells of
+        the noise, or where the motion depends on the model of the motion, until it stays."""
+        for _ in range(FOLLOWED if self.problem.moves else 1):
             if best == NULL or self.ended:
                 return best
             before = best
-            self._along(best)
-            best = self._round(NULL, LEADERS)
+            self._again(best)
+            best = self._grow(self._round(NULL, LEADERS))
             if best == before:
                 break
-        return self._swap(self._regrow(self._grow(best))) if best else best
+        return self._swap(best) if best else best
 
-    def _along(self, guess: Hypothesis) -> None:
-        """Begin again along the motion that a guess makes of the data."""
-        self.say(f"searching again with {' + '.join(guess)} in the model")
-        self.start(self._settle(guess))
-        self.visit(guess)
-
-    def _regrow(self, best: Hypothesis) -> Hypothesis:
-        """Find the motion again with several effects, each of which changes it, and grow."""
-        for _ in range(REGROWN):
-            if len(best) < 2 or self.ended:
-                break
-            before = best
-            self._along(best)
-            best = self._grow(best)
-            if best == before:
-                break
-        return best
+    def _again(self, best: Hypothesis) -> None:
+        """Begin again under the noise, or along the motion, that the best hypothesis makes."""
+        self.say(f"searching again with {' + '.join(best)} in the model")
+        if self.problem.moves:
+            self.start(self._settle(best))
+        else:
+            self.base.seen_from(self.points[best].fit.theta)
+            self.problem, self.points = self.base.problem, {NULL: self.base.point}
+        self.visit(best)
 
     def _settle(self, hypothesis: Hypothesis) -> Mapping[str, float]:
         """Find the motion of a hypothesis until late sensors stay as late; the best theta."""

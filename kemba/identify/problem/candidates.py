@@ -12,15 +12,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
+import numpy as np
+
 from kemba.effects import BY_KIND
 from kemba.effects.base import At, Contribution, Effect
 from kemba.effects.mechanics.geometry import SIZES, Geometry
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.effects.pneumatics.supply import SupplyLine
-from kemba.identify.problem.problem import Candidate, Parameter, Theta
-from kemba.identify.problem.sensor_faults import possible_faults
+from kemba.identify.problem.problem import Array, Candidate, Parameter, Theta
+from kemba.identify.problem.sensor_faults import SensorFaults, possible_faults
 from kemba.model.evaluation import port_name
 from kemba.model.model import Model
+from kemba.model.rest import StatesAlong
 from kemba.quantity import Param, Quantity, Tolerance
 
 ORIFICE = "chambers:orifice"
@@ -203,7 +206,6 @@ def leg_by_leg(model: Model) -> Model:
     return Model(model.mechanism, effects, model.supply, model.name)
 
 
-T = TypeVar("T")
 SEARCHED: dict[str, Effect] = {ORIFICE: OrificeShare(), LINE: LineResistance()}
 
 
@@ -241,8 +243,25 @@ def by_default(name: str) -> Effect:
     return BY_KIND[kind].model_validate({"kind": kind, **where})
 
 
-class CompiledModels(Generic[T]):
-    """A model compiled with the effects that theta switches on, each set of effects once.
+class OpenModel:
+    """A model with some numbers left open: `free` parameters, `scaled` figures and tables."""
+
+    def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
+        self.model, self.names = model, (*free, *scaled)
+        self.node = model.build(free, scaled)
+        self.along = StatesAlong.of(model, self.node)
+
+    def parameters(self, values: Mapping[str, float]) -> Array:
+        """The open numbers (k,) in their order; `values` holds every name of `names`."""
+        return np.array([values[name] for name in self.names])
+
+
+M = TypeVar("M", bound=OpenModel)
+
+
+class CompiledModels(Generic[M]):
+    """A model compiled with the effects that theta switches on, each set of effects once, and what
+    its sensors make of it.
 
     `figures`: nominal numbers of the model that theta may scale, with factor and 1 sigma, by name.
     `build` takes a model and the numbers that are left open: free parameters, scaled figures.
@@ -252,13 +271,13 @@ class CompiledModels(Generic[T]):
         self,
         model: Model,
         candidates: Mapping[str, Candidate],
-        figures: dict[str, tuple[float, float]],
-        build: Callable[[Model, tuple[str, ...], tuple[str, ...]], T],
+        build: Callable[[Model, tuple[str, ...], tuple[str, ...]], M],
     ) -> None:
-        self.model, self.candidates, self.figures = model, candidates, figures
-        self._build, self._known = build, dict[tuple[str, ...], T]()
+        self.model, self.candidates = model, candidates
+        self.figures, self.sensors = nominal_figures(model), SensorFaults(model.effects)
+        self._build, self._known = build, dict[tuple[str, ...], M]()
 
-    def at(self, theta: Theta) -> T:
+    def at(self, theta: Theta) -> M:
         """The model with the effects on its list that theta switches on."""
         active = tuple(
             name for name, c in sorted(self.candidates.items()) if not c.sensor and c.is_on(theta)
@@ -272,10 +291,10 @@ class CompiledModels(Generic[T]):
             self._known[active] = self._build(model, free, tuple(self.figures))
         return self._known[active]
 
-    def values(self, theta: Theta, names: Iterable[str]) -> dict[str, float]:
-        """What these open numbers are at theta."""
+    def values(self, theta: Theta) -> dict[str, float]:
+        """What the open numbers of this model are at theta."""
         nominal = {name: factor for name, (factor, _) in self.figures.items()}
-        return {name: theta.get(name, nominal.get(name, 0.0)) for name in names}
+        return {name: theta.get(name, nominal.get(name, 0.0)) for name in self.at(theta).names}
 
 
 def where_field(kind: str) -> str:

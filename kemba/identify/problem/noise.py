@@ -369,32 +369,25 @@ def colours(
     return found
 
 
-def learn(residual: Array, order: int | None = None, careful: bool = False) -> Colour:
-    """Yule-Walker fit to a residual (n,), its order by BIC up to `order` (None: the setting).
-
-    `careful`: spikes get less weight from now on.
-    """
-    order = ORDER if order is None else order
+def learn(residual: Array, careful: bool = False) -> Colour:
+    """Yule-Walker fit to a residual (n,), its order by BIC; `careful`: spikes get less weight from
+    now on."""
     weight = caution(residual) if careful else None
-    found = _yule_walker(residual if weight is None else residual * weight, order)
-    return replace(found, rows=len(residual), weight=weight)
-
-
-def _yule_walker(residual: Array, order: int) -> Colour:
-    scale = max(1.4826 * float(np.median(np.abs(residual))), SOFTEST)
-    r = np.clip(residual, -TRIM * scale, TRIM * scale)
-    n = len(r)
+    seen = residual if weight is None else residual * weight
+    scale = max(1.4826 * float(np.median(np.abs(seen))), SOFTEST)
+    r, n = np.clip(seen, -TRIM * scale, TRIM * scale), len(seen)
     if n < FEWEST:
-        return Colour(np.zeros(0), max(float(np.sqrt(np.mean(r**2))), LEAST))
-    c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(order + 1)])
+        sigma = max(float(np.sqrt(np.mean(r**2))), LEAST)
+        return Colour(np.zeros(0), sigma, n, weight)
+    c = np.array([np.dot(r[: n - k], r[k:]) / n for k in range(ORDER + 1)])
     best, chosen = np.inf, (np.zeros(0), float(c[0]))
-    for p in range(order + 1):
+    for p in range(ORDER + 1):
         phi = solve_toeplitz(c[:p], c[1 : p + 1]) if p else np.zeros(0)
         power = max(float(c[0] - phi @ c[1 : p + 1]), 1e-6)
         bic = n * np.log(power) + p * np.log(n)
         if bic < best - 1e-9:
             best, chosen = bic, (phi, power)
-    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), LEAST))
+    return Colour(chosen[0], max(float(np.sqrt(chosen[1])), LEAST), n, weight)
 
 
 def caution(residual: Array) -> Array:

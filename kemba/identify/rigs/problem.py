@@ -33,7 +33,6 @@ from kemba.identify.problem.problem import (
     Rows,
     Theta,
 )
-from kemba.identify.problem.sensor_faults import is_straight
 from kemba.identify.rigs.prediction import Predictor
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog, prepare
 from kemba.identify.rigs.validate import contradictions
@@ -58,8 +57,8 @@ def _sensor_sigmas(model: Model, logs: Sequence[RigLog]) -> dict[str, float]:
     for name in model.mechanism.logged:
         if name == ANSWER[rig] == "axis/tau":
             continue
-        place, channels = name == PLACE[rig], [log.channels for log in logs]
-        sigmas = [c.q_sigma if place else c.sigma[name] for c in channels]
+        place = name == PLACE[rig]
+        sigmas = [log.q_sigma if place else log.sigma[name] for log in logs]
         found[name] = float(np.median(sigmas))
     return found
 
@@ -81,7 +80,7 @@ def usual_force(predictor: Predictor, logs: Iterable[RigLog]) -> float:
     bore = predictor.model.mechanism.bore
     if bore is not None:
         return SEAL * bore.bore
-    forces = [np.abs(log.channels.others[predictor.answer]) for log in logs]
+    forces = [np.abs(log.others[predictor.answer]) for log in logs]
     return DRIVE * float(np.percentile(np.concatenate(forces), LARGE))
 
 
@@ -140,7 +139,7 @@ def _shaped(candidate: Candidate, typical: Mapping[str, float], predictor: Predi
 def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]:
     """Where the search for shapes starts, by name in theta."""
     speed = np.concatenate([np.abs(log.speed) for log in logs])
-    places = np.concatenate([log.channels.q[log.channels.rows] for log in logs])
+    places = np.concatenate([log.q[log.rows] for log in logs])
     fast, travel = float(np.percentile(speed, LARGE)), float(np.ptp(places))
     found = {
         "stribeck_friction.v_b": FADING * fast,
@@ -158,9 +157,7 @@ def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[f
     """Travel and phase of the sine that explains most beside inertia, friction, offset."""
     none: Theta = {}
     force = np.concatenate([-predictor.gap(log, none) for log in logs])
-    q, v, a = (
-        np.concatenate([getattr(log.channels, c)[log.channels.rows] for log in logs]) for c in "qva"
-    )
+    q, v, a = (np.concatenate([getattr(log, c)[log.rows] for log in logs]) for c in "qva")
     sure = np.concatenate([log.doubt for log in logs]) < 0.1
     if sure.sum() > 100:
         force, q, v, a = force[sure], q[sure], v[sure], a[sure]
@@ -260,10 +257,6 @@ class RigProblem(ColouredProblem):
         found._sigma = [np.sqrt(one + lacks) for one in power]
         return found
 
-    def is_straight(self, name: str) -> bool:
-        """Whether the residual is linear in a figure."""
-        return is_straight(name)
-
     def operating_point(self) -> OperatingPoint:
         """The piston of every row; a drive has none."""
         bore = self.model.mechanism.bore
@@ -330,8 +323,7 @@ class RigProblem(ColouredProblem):
         """Position, rate and measured force (k,) of every run."""
         found = []
         for log in self.logs:
-            c, rows = log.channels, log.channels.rows
-            found.append((c.q[rows], c.v[rows], c.others[self.answer][rows]))
+            found.append(tuple(c[log.rows] for c in (log.q, log.v, log.others[self.answer])))
         return found
 
 

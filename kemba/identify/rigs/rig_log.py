@@ -37,26 +37,25 @@ GAP = 5.0  # rows farther apart than so many usual steps are a gap
 FINEST = 5e-4  # smallest noise, as a share of a channel's range
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Filtered:
     """Channels on a regular grid, filtered; the grid has jumps where the log has gaps.
 
-    `time` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name; `read` (n,): the
+    `grid` [s], `q`, `v`, `a` (n,): position and its rates; `others` (n,) by name; `read` (n,): the
     position as it was read; `quick` (n,): its rate behind a filter only as wide as its sign needs,
     1 sigma `quick_width` [s]. `rows` (k,): indices of the rows that are judged, away from gaps.
-    `q_sigma`, `v_sigma`, `a_sigma`: noise of the filtered position and its rates; `sigma`: noise of
-    the others by name. `width` [s] of the filter. `begins` (m,): first index of every stretch
-    without a gap.
+    `q_sigma`, `a_sigma`: noise of the filtered position and its acceleration; `sigma`: noise of the
+    others by name. `width` [s] of the filter. `begins` (m,): first index of every stretch without a
+    gap.
     """
 
-    time: Array
+    grid: Array
     q: Array
     v: Array
     a: Array
     others: dict[str, Array]
     rows: np.ndarray
     q_sigma: float
-    v_sigma: float
     a_sigma: float
     sigma: dict[str, float]
     width: float
@@ -68,7 +67,7 @@ class Filtered:
 
     def smoothed(self, values: Array) -> Array:
         """Values (n,) of the grid behind the filter of the channels."""
-        width = self.width / float(np.median(np.diff(self.time)))
+        width = self.width / float(np.median(np.diff(self.grid)))
         return np.concatenate([_smooth(y, width) for y in np.split(values, self.begins[1:])])
 
 
@@ -139,7 +138,6 @@ def filtered(
         dict(zip(names, table[6:], strict=True)),
         np.concatenate(rows),
         _noise_of(0, noise, step, width),
-        _noise_of(1, noise, step, width),
         _noise_of(2, noise, step, width),
         sigma,
         width * step,
@@ -173,23 +171,22 @@ BLURRED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class RigLog:
+class RigLog(Filtered):
     """The filtered channels of one log; `doubt` (k,): share of a friction's size by which it is
     uncertain at each judged row, because the sign of the rate is."""
 
     name: str
-    channels: Filtered
     doubt: Array
 
     @property
     def time(self) -> Array:
         """Times (k,) [s] of the judged rows."""
-        return np.asarray(self.channels.time[self.channels.rows])
+        return np.asarray(self.grid[self.rows])
 
     @property
     def speed(self) -> Array:
         """Rate (k,) at the judged rows."""
-        return np.asarray(self.channels.v[self.channels.rows])
+        return np.asarray(self.v[self.rows])
 
 
 def prepare(log: Trajectory, model: Model) -> RigLog:
@@ -210,17 +207,17 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
         hint = "log faster, or longer without a break"
         raise BadData([KembaError(str(log.meta.get("path", name)), what, hint=hint)])
     # where the acceleration jumps, the rate behind a filter is off by that share of its width
-    reach = max(round(2.0 * found.width / float(np.median(np.diff(found.time)))), 1)
+    step = float(np.median(np.diff(found.grid)))
+    reach = max(round(2.0 * found.width / step), 1)
     jump = np.abs(np.roll(found.a, -reach) - np.roll(found.a, reach))
     blur = 2.0 * np.hypot(found.quick_sigma, jump * found.quick_width / np.sqrt(2.0 * np.pi))
     high, low = (np.tanh((found.quick + s * blur) / mechanism.sign_speed) for s in (1.0, -1.0))
     doubt = found.smoothed(0.5 * (high - low))[found.rows]
     if "measured_chambers.travel" in model.parameters:
         travel = model.parameters["measured_chambers.travel"][1]
-        step = float(np.median(np.diff(found.time)))
         # contacts that slide after some travel; what was before a stretch is not known
         parts = np.split(found.q, found.begins[1:])
         held = 1.0 - np.abs(np.concatenate([dahl(q, DOUBTED * travel) for q in parts]))
         reach = 2 * int(np.ceil(BLURRED * found.width / step)) + 1
         doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])
-    return RigLog(name, found, doubt)
+    return RigLog(**vars(found), name=name, doubt=doubt)

@@ -72,7 +72,7 @@ class _Force:
 
     def read(self, log: RigLog) -> Array:
         """The force (k,) that was measured at the judged rows."""
-        return np.asarray(log.channels.others[self.answer][log.channels.rows])
+        return np.asarray(log.others[self.answer][log.rows])
 
     def size(self, log: RigLog) -> float:
         """Its size in its noise."""
@@ -118,9 +118,7 @@ class _Force:
     def _predicted(self, log: RigLog, resting: bool = False) -> Array:
         """What the model predicts (k,); `resting`: of an axis that does not accelerate."""
         if (log, resting) not in self._seen:
-            trial, c = log, log.channels
-            if resting:
-                trial = replace(log, channels=replace(c, a=np.zeros_like(c.a)))
+            trial = replace(log, a=np.zeros_like(log.a)) if resting else log
             self._seen[log, resting] = self.gap(trial) + self.read(log)
         return self._seen[log, resting]
 
@@ -145,10 +143,10 @@ def mix_ups(log: RigLog, force: _Force) -> Iterator[tuple[Texts, RigLog, Units]]
     bore, logged = mechanism.bore, mechanism.logged
     end = END if bore else f"{place} has the reversed sign"
     other = REVERSED if bore else f"{answer} has the reversed sign"
-    pressures = list(_pressures({n: log.channels.others[n] for n in logged if n.endswith("/P")}))
+    pressures = list(_pressures({n: log.others[n] for n in logged if n.endswith("/P")}))
     for sign, turned, (said, read) in product((1.0, -1.0), (1.0, -1.0), pressures):
         texts = (end,) * (sign < 0.0) + (other,) * (turned < 0.0) + said
-        others = {**log.channels.others, answer: turned * log.channels.others[answer], **read}
+        others = {**log.others, answer: turned * log.others[answer], **read}
         trial = _moved(log, sign, bore.stroke if bore and sign < 0.0 else 0.0, others)
         yield texts, trial, ()
         if logged[place] == "rad":  # where it hangs straight down
@@ -188,7 +186,7 @@ def _other_units(
         if not names or any(error <= ALIKE * least for error in fewer):
             continue
         if not any(1.0 / UNIT < f < UNIT for f in found.values()):
-            answer = {force.answer: sign * trial.channels.others[force.answer]}
+            answer = {force.answer: sign * trial.others[force.answer]}
             alike = [force.place, TIME] if not (drive or force.model.mechanism.bore) else []
             if place and force.answer in found:  # a weight that hardly turns tells their ratio
                 near = min(error(stretched(size + by)) for by in (-np.log(UNIT), np.log(UNIT)))
@@ -199,7 +197,7 @@ def _other_units(
                 suits = f"what suits {' and '.join(alike)} {ONE}"
                 texts += (f"{force.answer} is about {times} times {suits}",)
             texts += tuple(starmap(_wrong, found.items()))
-            yield texts, _moved(trial, 1.0, 0.0, trial.channels.others | answer), units
+            yield texts, _moved(trial, 1.0, 0.0, trial.others | answer), units
 
 
 def _wrong(name: str, factor: float) -> str:
@@ -224,29 +222,28 @@ def _pressures(read: dict[str, Array]) -> Iterator[tuple[Texts, dict[str, Array]
 
 def _moved(log: RigLog, gain: float, zero: float, others: dict[str, Array]) -> RigLog:
     """A log whose position is gain * q + zero, with its other channels."""
-    c, turned = log.channels, {n: gain * getattr(log.channels, n) for n in ("v", "a", "quick")}
-    moved = {n: gain * getattr(c, n) + zero for n in ("q", "read")}
-    return replace(log, channels=replace(c, others=others, **moved, **turned))
+    turned = {n: gain * getattr(log, n) for n in ("v", "a", "quick")}
+    moved = {n: gain * getattr(log, n) + zero for n in ("q", "read")}
+    return replace(log, others=others, **moved, **turned)
 
 
 def _stretched(log: RigLog, size: float) -> RigLog:
     """A log with exp(size) times the readings of its position."""
-    return _moved(log, float(np.exp(size)), 0.0, log.channels.others)
+    return _moved(log, float(np.exp(size)), 0.0, log.others)
 
 
 def _timed(log: RigLog, gain: float) -> RigLog:
     """A log that takes so many times as long."""
-    c = log.channels
-    v, quick, a, width = c.v / gain, c.quick / gain, c.a / gain**2, gain * c.width
-    return replace(log, channels=replace(c, time=gain * c.time, width=width, v=v, quick=quick, a=a))
+    v, quick, a, width = log.v / gain, log.quick / gain, log.a / gain**2, gain * log.width
+    return replace(log, grid=gain * log.grid, width=width, v=v, quick=quick, a=a)
 
 
 def _exchanged(log: RigLog, answer: str) -> RigLog:
     """A log with the readings of position and force exchanged."""
-    c, q = log.channels, log.channels.others[answer]
-    v = np.gradient(q, c.time)
-    a, others = np.gradient(v, c.time), {**c.others, answer: c.q}
-    return replace(log, channels=replace(c, others=others, q=q, read=q, v=v, quick=v, a=a))
+    q = log.others[answer]
+    v = np.gradient(q, log.grid)
+    a, others = np.gradient(v, log.grid), {**log.others, answer: log.q}
+    return replace(log, others=others, q=q, read=q, v=v, quick=v, a=a)
 
 
 def _best(

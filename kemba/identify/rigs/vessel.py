@@ -7,31 +7,25 @@ import numpy as np
 
 from kemba.effects.series import Series
 from kemba.identify.infer.refit import RefitSettings
-from kemba.identify.problem.candidates import CompiledModels, nominal_figures, sensor_candidates
+from kemba.identify.problem.candidates import CompiledModels, OpenModel, sensor_candidates
 from kemba.identify.problem.problem import Array, Problem, Rows, Theta, bounded
-from kemba.identify.problem.sensor_faults import SensorFaults
 from kemba.identify.rigs.problem import standing_candidates
 from kemba.model.model import Model
-from kemba.model.rest import StatesAlong
 from kemba.trajectory import Trajectory
 
 STEPS = 2000  # steps over a log
 
 
-class BlowDown:
-    """A vessel's model with numbers left free: `free` parameters, `scaled` figures."""
-
-    def __init__(self, model: Model, free: tuple[str, ...], scaled: tuple[str, ...]) -> None:
-        self.names = (*free, *scaled)
-        self._along = StatesAlong(model, model.build(free, scaled))
+class BlowDown(OpenModel):
+    """The air of a vessel that blows down."""
 
     def run(
         self, begin: float, end: float, start: Array, values: Mapping[str, float]
     ) -> tuple[Array, Array]:
-        """Times (n,) [s] and states (2, n), P [Pa] and T [K], from `start` (2,)."""
-        still = np.zeros((self._along.width, STEPS))
-        still[0] = h = (end - begin) / STEPS
-        states = self._along.run(start, still, np.array([values[name] for name in self.names]))
+        """Times (n,) [s] and states (n, 2), P [Pa] and T [K], from `start` (2,)."""
+        still = np.zeros((STEPS, self.along.width))
+        still[:, 0] = h = (end - begin) / STEPS
+        states, _ = self.along.run(start, still, self.parameters(values))
         return np.asarray(begin + h * np.arange(STEPS + 1)), states
 
 
@@ -107,14 +101,13 @@ class VesselProblem(Problem):
                 size = LATE * longest
                 fault = replace(fault, lead=replace(fault.lead, size=size))
             self.candidates[name] = fault
-        self.sensors, self.figures = SensorFaults(model.effects), nominal_figures(model)
-        self.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
-        self._blow_down = CompiledModels(model, self.candidates, self.figures, BlowDown)
+        self.predictor = predictor = CompiledModels(model, self.candidates, BlowDown)
+        predictor.figures |= {name: (1.0, sigma) for name, sigma in (figures or {}).items()}
         starts = {}
         for i, log in enumerate(self.logs):
             starts[f"start:vessel/P[{i}]"] = (0.0, START_PRESSURE * log.start[0])
             starts[f"start:vessel/T[{i}]"] = (0.0, START_TEMPERATURE)
-        self.nuisance = self.figures | self.sensors.nuisance | starts
+        self.nuisance = predictor.figures | predictor.sensors.nuisance | starts
 
     def residual(self, theta: Theta) -> Array:
         parts = []
@@ -127,18 +120,18 @@ class VesselProblem(Problem):
 
     def expected(self, theta: Theta, index: int) -> dict[str, Array]:
         """Channel -> what should have been read (k,), in its unit."""
-        log = self.logs[index]
-        blow, near = self._blow_down.at(theta), (1.0 / FARTHEST, FARTHEST)
-        values = self._blow_down.values(theta, blow.names)
-        for name in values.keys() & self.figures.keys():  # beyond, nothing can be predicted
+        log, predictor, near = self.logs[index], self.predictor, (1.0 / FARTHEST, FARTHEST)
+        values = predictor.values(theta)
+        for name in values.keys() & predictor.figures.keys():  # beyond, nothing can be predicted
             values[name] = float(np.clip(values[name], *near))
         shift = [theta.get(f"start:{name}[{index}]", 0.0) for name in CHANNELS]
         start = np.array(log.start) * np.clip(1.0 + np.array(shift) / log.start, *near)
-        time, states = blow.run(log.begin, log.begin + log.duration, start, values)
+        end = log.begin + log.duration
+        time, states = predictor.at(theta).run(log.begin, end, start, values)
         found = {}
         for name, (at, _) in log.readings.items():
-            true = Series(time, states[CHANNELS.index(name)])
-            shown = self.sensors.shown(theta, name, true).value
+            true = Series(time, states[:, CHANNELS.index(name)])
+            shown = predictor.sensors.shown(theta, name, true).value
             found[name] = np.interp(at, time, shown)
         return found
 

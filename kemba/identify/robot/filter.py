@@ -145,40 +145,30 @@ def predicted(
     return states, (-seen if y is None else y - seen)
 
 
-def smooth(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:
-    """(smoothed x (n, L, d), smoothed w (n, L, k)) of one column (Bryson and Frazier)."""
-    s = system
-    states, errors = predicted(s, gain, y[..., None], g[..., None])
-    n, runs, _, d = s.H.shape
-    solved = gain.whitener.swapaxes(-1, -2) @ (gain.whitener @ errors)
-    pushed = s.H.swapaxes(-1, -2) @ solved
-    x, w = np.empty((n, runs, d)), np.empty((n, runs, s.G.shape[-1]))
-    pull = np.zeros((runs, d, 1))
-    for k in reversed(range(n)):
-        w[k] = (s.W[k] @ (s.G[k].swapaxes(-1, -2) @ pull))[..., 0]
-        pull = pushed[k] + gain.turn[k].swapaxes(-1, -2) @ pull
-        x[k] = (states[k] + gain.P[k] @ pull)[..., 0]
-    return x, w
-
-
-def smooth_with_band(system: System, gain: FilterGains, y: Array, g: Array) -> tuple[Array, Array]:
-    """(smoothed x, its variances), both (n, L, d), of one column; `g` (n, L, j) pushes the first
-    j channels of G."""
+def smooth(
+    system: System, gain: FilterGains, y: Array, g: Array, band: bool = False
+) -> tuple[Array, Array, Array]:
+    """(smoothed x (n, L, d), smoothed w (n, L, k), variances of x (n, L, d)) of one column (Bryson
+    and Frazier); `g` (n, L, j) pushes the first j channels of G. Variances take as long as all
+    else: without `band` they are zero."""
     s = system
     n, runs, _, d = s.H.shape
     states, errors = predicted(s, gain, y[..., None], g[..., None])
     errors = gain.whitener @ errors
     seen = np.where(np.isfinite(s.R)[..., None], s.H, 0.0)
     whitened = (gain.whitener @ seen).swapaxes(-1, -2)
-    x, variance = np.empty((n, runs, d)), np.empty((n, runs, d))
+    x, variance = np.empty((n, runs, d)), np.zeros((n, runs, d))
+    w = np.empty((n, runs, s.G.shape[-1]))
     pull, certainty = np.zeros((runs, d, 1)), np.zeros((runs, d, d))
     for k in reversed(range(n)):
+        w[k] = (s.W[k] @ (s.G[k].swapaxes(-1, -2) @ pull))[..., 0]
         back, P = gain.turn[k].swapaxes(-1, -2), gain.P[k]
         pull = whitened[k] @ errors[k] + back @ pull
-        certainty = whitened[k] @ whitened[k].swapaxes(-1, -2) + back @ certainty @ gain.turn[k]
         x[k] = (states[k] + P @ pull)[..., 0]
-        variance[k] = np.diagonal(P, axis1=1, axis2=2) - ((P @ certainty) * P).sum(axis=2)
-    return x, np.maximum(variance, 0.0)
+        if band:
+            certainty = whitened[k] @ whitened[k].swapaxes(-1, -2) + back @ certainty @ gain.turn[k]
+            variance[k] = np.diagonal(P, axis1=1, axis2=2) - ((P @ certainty) * P).sum(axis=2)
+    return x, w, np.maximum(variance, 0.0)
 
 
 Noise = Sequence[ChannelNoise]  # one per channel; empty: all are white

@@ -29,7 +29,7 @@ from kemba.identify.problem.problem import (
     Theta,
 )
 from kemba.identify.robot.batch import ResampledLog
-from kemba.identify.robot.filter import System, gains, smooth_with_band
+from kemba.identify.robot.filter import System, gains, smooth
 from kemba.identify.robot.linear import GROUND, QUIET, densities, scatter
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.state import LinearisedState
@@ -264,7 +264,7 @@ class RobotForces(Problem):
         valid, k = state.batch.valid, len(names)
         for _ in range(ROUNDS if strength is None else 1):
             system = _with_forces(state, quiet, sigma)
-            x, variance = smooth_with_band(system, gains(system), y, g)
+            x, _, variance = smooth(system, gains(system), y, g, band=True)
             power = (x[..., -k:] ** 2 + variance[..., -k:])[valid].mean(axis=0)
             ratio = np.sqrt(power) / sigma
             # towards nothing such rounds creep, so that their steps are doubled

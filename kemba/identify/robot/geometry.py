@@ -20,7 +20,8 @@ from kemba.identify.problem.sensor_faults import GEOMETRY
 from kemba.identify.robot.batch import Batch
 from kemba.identify.robot.contact import steady
 from kemba.identify.robot.linear import Reference
-from kemba.identify.robot.physics import Physics, SampleMap
+from kemba.identify.robot.physics import Physics
+from kemba.machine_code import SampleMap
 from kemba.mechanism.knee import flexion_of
 from kemba.mechanism.links import altered
 
@@ -83,9 +84,9 @@ class Standing:
         lift = steady(reference.a[..., 1:2], dt) / physics.mechanism.need_robot().gravity
         load = np.maximum(1.0 + batch.flat(lift)[::step, 0], 0.0)
         self.samples = [q[:, : 3 + self.legs], y[:, -self.legs :], load[:, None]]
-        self._map = SampleMap(self._function(physics))
+        self._map = self._compiled(physics)
 
-    def _function(self, physics: Physics) -> ca.Function:
+    def _compiled(self, physics: Physics) -> SampleMap:
         """(q without knees, pistons, load, x) -> heights (legs,) and their slopes along x."""
         node, legs, robot = physics.node, self.legs, physics.mechanism.need_robot()
         x = ca.SX.sym("x", len(self.names) + 4 + 2 * legs)
@@ -110,7 +111,7 @@ class Standing:
         )
         heights = ca.substitute(feet, ca.vertcat(node.q, node.p), ca.vertcat(q, p))
         heights += load * zeros[-2]
-        return ca.Function("standing", [body, pistons, load, x], [heights, ca.jacobian(heights, x)])
+        return SampleMap([body, pistons, load, x], [heights, ca.jacobian(heights, x)])
 
     def heights(self, x: Array) -> tuple[Array, Array]:
         """Heights (n, legs) [m] of the feet, and their slopes (n, legs, k)."""

@@ -113,7 +113,7 @@ def first_reference(physics: Physics, batch: Batch, p: Array) -> Reference:
     H = np.broadcast_to(np.hstack([np.eye(k), np.zeros((k, k))]), (*q.shape[:2], k, 2 * k))
     P0 = np.broadcast_to(np.diag([ANYWHERE] * k + [ANYHOW] * k), (q.shape[1], 2 * k, 2 * k))
     system = System(F, G, W, H, R, P0)
-    x, w = smooth(system, gains(system), q, np.zeros((*q.shape[:2], k)))
+    x, w, _ = smooth(system, gains(system), q, np.zeros((*q.shape[:2], k)))
     return Reference(x[..., :k], x[..., k:], np.where(batch.valid[..., None], w, 0.0))
 
 
@@ -360,7 +360,7 @@ def smoothed(motion: LinearisedMotion, gain: FilterGains, y: Array, g: Array) ->
     """A better reference: the smoothed deviations added. `y` (n, L, m) measured beyond the
     reference, `g` (n, L, k) acceleration of the model beyond the reference's."""
     k = motion.ref.q.shape[2]
-    x, w = smooth(motion.system, gain, y, g)
+    x, w, _ = smooth(motion.system, gain, y, g)
     A_q, A_v = motion.A
     dq, dv = x[..., :k], x[..., k : 2 * k]
     turn = (A_q @ dq[..., None] + A_v @ dv[..., None])[..., 0]

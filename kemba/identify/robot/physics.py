@@ -1,8 +1,7 @@
 """Numeric functions of a robot model along measured motion, mapped over many samples at once."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -14,94 +13,10 @@ from kemba.identify.problem.candidates import (
     without_delay,
 )
 from kemba.identify.problem.problem import Array, Theta
-from kemba.machine_code import Native
+from kemba.machine_code import SampleMap
 from kemba.mechanism.robot import link_regressors
 from kemba.model.model import Model
-from kemba.model.rest import Rest, midpoint_step, rate_of
-from kemba.quantity import Quantity
-
-
-class SampleMap:
-    """A function of samples; the answers are those of CasADi's own machine."""
-
-    def __init__(self, function: ca.Function) -> None:
-        given = function.sx_in()
-        outputs = function.call(given)
-        self._name = function.name()
-        self._widths = [symbol.numel() for symbol in given]
-        self._shapes = [output.shape for output in outputs]
-        by_rows = [ca.reshape(output.T, output.numel(), 1) for output in outputs]
-        self._code = Native(given, {self._name: [ca.vertcat(*by_rows)]})
-
-    def __call__(self, samples: Sequence[Array], p: Array | None = None) -> list[Array]:
-        """Arrays (N, rows[, columns]) from samples (N, .); `p` (k,): last input of all."""
-        given = [*samples] if p is None else [*samples, p]
-        count = len(samples[0])
-        x = np.empty((count, sum(self._widths)))
-        edges = np.cumsum([0, *self._widths])
-        for values, first, end in zip(given, edges[:-1], edges[1:], strict=True):
-            x[:, first:end] = values
-        y = np.zeros((count, sum(rows * columns for rows, columns in self._shapes)))
-        self._code.rows(self._name, x, y)
-        ends = np.cumsum([rows * columns for rows, columns in self._shapes])
-        blocks = np.split(y, ends[:-1], axis=1)
-        return [
-            block if columns == 1 else block.reshape(count, rows, columns)
-            for block, (rows, columns) in zip(blocks, self._shapes, strict=True)
-        ]
-
-
-Index = np.ndarray[Any, np.dtype[np.int_]]
-
-
-class StateRunner:
-    """Integrates s' = rate(q, v, s, u, p) for given motion, from rest at its first place."""
-
-    def __init__(self, symbols: list[ca.SX], rate: ca.SX, quantities: Sequence[Quantity]) -> None:
-        q, v, s, u, p = symbols
-        self.count = s.numel()
-        if not self.count:
-            return
-        self._rest = Rest(s, [q, v, u, p], rate, quantities)
-        self._symbols, self._rate = symbols, rate
-        self._codes: dict[bytes, Native] = {}
-
-    def run(
-        self, h: Array, q: Array, v: Array, u: Array, p: Array, among: Index | None = None
-    ) -> Array:
-        """Mean of the states (N, ns) over steps h (N,) with q, v, u (N, .) held over each.
-
-        `among`: states that are asked for, and that depend on no others (None: all); the others
-        stay at rest.
-        """
-        count = len(h)
-        if not self.count:
-            return np.empty((count, 0))
-        own = np.arange(self.count) if among is None else among
-        rest, ns = self._rest(q[0], 0.0 * v[0], u[0], p), len(own)
-        same = np.broadcast_to(p, (count, len(p)))
-        given = np.hstack([h[:, None], q, v, u, same])
-        x = np.zeros((count + 1, ns + given.shape[1]))
-        x[:-1, ns:] = given
-        x[0, :ns] = rest[own]
-        means = np.zeros((count, ns))
-        # each step begins where the one before has ended
-        self._code(own).rows("step", x[:-1], x[1:, :ns], means)
-        whole = np.tile(rest, (count, 1))
-        whole[:, own] = means
-        return whole
-
-    def _code(self, own: Index) -> Native:
-        """A step of these states."""
-        key = own.tobytes()
-        if key not in self._codes:
-            q, v, s, u, p = self._symbols
-            h, held = ca.SX.sym("h"), [q, v, u, p]
-            at = own.tolist()
-            step = midpoint_step(self._rate[at], s[at], held, held, h)
-            self._codes[key] = Native([s[at], h, *held], {"step": step})
-        return self._codes[key]
-
+from kemba.model.rest import Index, StatesAlong, rate_of
 
 FOLDED = 2.9  # rad; a knee folds less far, whatever the lengths of its leg
 REACH = 4.0  # largest error, in sigmas: beyond chance
@@ -146,7 +61,7 @@ class Physics:
         self.moving = [n for n, moves in zip(self.names, self.moves, strict=True) if moves]
         p = ca.vertcat(*(self.p[int(i)] for i in np.flatnonzero(self.moves)))
         states = list(self.model.states.values())
-        self.states = StateRunner([node.q, node.v, node.s, node.u, p], rate, states)
+        self.states = StatesAlong(node.s, [node.q, node.v, node.u, p], rate, states)
         self._rate = rate
         self.lengths = np.array([n.startswith("geometry:") for n in self.names])
         self.grip = grip
@@ -187,15 +102,17 @@ class Physics:
         return tuple(c.name for c in self.mechanism.coordinates[: 3 + len(self.legs)]) + pistons
 
     @cached_property
-    def functions(self) -> dict[str, ca.Function]:
-        """All functions of samples, by name."""
+    def functions(self) -> dict[str, tuple[list[ca.SX], list[ca.SX]]]:
+        """Inputs and outputs of all functions of samples, by name."""
         node = self.node
         r = self._force
         full = [node.q, node.v, node.a, node.s, node.u, self.p]
         y = ca.vertcat(*(node.outputs[name] for name in self.channels))
         feet, feet_rate, feet_slope = self._feet()
         motion = [node.q, node.v, self.p]
-        named = {
+        regress = link_regressors(self.mechanism)
+        coordinates = regress.sx_in()
+        return {
             "residual": (full, [r]),
             "mass": (full, [ca.jacobian(r, node.a)]),
             "stiffness": (full, [ca.jacobian(r, x) for x in (node.q, node.v)]),
@@ -203,10 +120,8 @@ class Physics:
             "measured": (motion, [y, ca.jtimes(y, node.q, node.v), ca.jacobian(y, node.q)]),
             "feet": (motion, [feet, feet_rate, feet_slope]),
             "seen": (motion, [y, feet]),
+            "links": (coordinates, regress.call(coordinates)),
         }
-        made = {k: ca.Function(k, a, b, {"cse": True}) for k, (a, b) in named.items()}
-        made["links"] = link_regressors(self.mechanism)
-        return made
 
     def _feet(self) -> tuple[ca.SX, ca.SX, ca.SX]:
         """Of feet: x and distance from the ground; rates, slopes along it and out of it."""
@@ -255,7 +170,7 @@ class Physics:
     def call(self, name: str, *samples: Array, p: Array | None = None) -> list[Array]:
         """Function `name` over samples (N, .): arrays (N, rows) or (N, rows, columns)."""
         if name not in self._maps:
-            self._maps[name] = SampleMap(self.functions[name])
+            self._maps[name] = SampleMap(*self.functions[name])
         return self._maps[name](samples, p)
 
     def knees(self, pistons: Array, p: Array) -> Array:

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kemba.effects.pneumatics.switching import delayed, instants, is_on
+from kemba.effects.pneumatics.switching import cut, delayed, instants, is_on
 from kemba.identify.problem.candidates import GRIP, SOFTNESS
 from kemba.identify.problem.noise import ChannelNoise
 from kemba.identify.problem.problem import Array, Flags, Theta
@@ -41,28 +41,17 @@ from kemba.identify.robot.linear import (
     read_schedules,
     smoothed,
 )
-from kemba.identify.robot.physics import Index, Physics
+from kemba.identify.robot.physics import Physics
+from kemba.model.rest import Index
 
 
 def substeps(log: ResampledLog, delays: Array) -> tuple[Array, Array, Index]:
-    """(times (N + 1,), valves (valves, N), index of each node) with a time at every switching.
-
-    `delays` (valves, 2): seconds from the command to switching on and off. As many times come back
-    whatever the delays are, so that functions built for one length serve them all.
-    """
-    first, last = log.time[0], log.time[-1]
-    events = [log.time]
-    for sent, late in zip(log.sent, delays, strict=True):
-        events.append(np.clip(instants(np.reshape(sent, (-1, 2)) + late), first, last))
-    everything = np.concatenate(events)
-    order = np.argsort(everything, kind="stable")
-    times = everything[order]
-    index = np.empty(len(order), int)
-    index[order] = np.arange(len(order))
+    """(times (N + 1,), valves (valves, N), index of each node) with a time at every switching;
+    `delays` (valves, 2): seconds from the command to switching on and off."""
+    acting = [delayed(sent, *late) for sent, late in zip(log.sent, delays, strict=True)]
+    times, index = cut(log.time, np.concatenate([instants(pulses) for pulses in acting]))
     middle = 0.5 * (times[1:] + times[:-1])
-    acting = (delayed(sent, *late) for sent, late in zip(log.sent, delays, strict=True))
-    valves = np.stack([is_on(pulses, middle) for pulses in acting])
-    return times, valves, index[: len(log.time)]
+    return times, np.stack([is_on(pulses, middle) for pulses in acting]), index
 
 
 def air_states(
@@ -86,7 +75,10 @@ def air_states(
         held = np.clip(np.searchsorted(log.time, middle, side="right") - 1, 0, n - 1)
         u = physics.arrange(log.torque[held].T, valves).T
         width = np.append(np.diff(log.time), 1.0)[:, None]
-        states = physics.states.run(h, q, v, u, p[physics.moves], among)
+        own = p[physics.moves]
+        start = physics.states.rest(q[0], 0.0 * v[0], u[0], own)
+        given = np.hstack([h[:, None], q, v, u])
+        _, states = physics.states.run(start, given, own, among)
         for store, values in zip(found, (states, u), strict=True):
             padded = np.append(values * h[:, None], 0 * values[:1], axis=0)
             sums = np.add.reduceat(padded, index, axis=0)

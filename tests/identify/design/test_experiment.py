@@ -1,6 +1,7 @@
 """The next test is designed for the rivals, and tells them apart on the twin as well."""
 
 import json
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from unittest.mock import patch
@@ -19,8 +20,9 @@ from kemba_cli.main import app
 
 @pytest.fixture
 def short_search() -> Iterator[None]:
-    """A search that tries few short tests, and looks at one test of each rig only."""
-    few = patch.multiple(DesignSearchSettings, members=6, generations=1)
+    """A search that tries few short tests, however long that takes, and looks at one test of each
+    rig only."""
+    few = patch.multiple(DesignSearchSettings, members=6, generations=1, budget=math.inf)
     with (
         few,
         patch.multiple(ExperimentSettings, tests=1),
@@ -48,7 +50,7 @@ def test_the_designed_test_is_short_and_better_per_second(
     """It separates friction from damping in half the log time of the best standard test."""
     folder = answer(tmp_path, ("seal_friction", "F_c", 8.0), ("piston_damping", "c", 30.0))
     told: list[str] = []
-    found = propose(folder, tmp_path / "next.yaml", told.append, bounded=False)
+    found = propose(folder, tmp_path / "next.yaml", told.append)
     standard, designed = found.standard, found.designed
     assert found.chosen is designed and found.nats > 5 and "decisive" in found.sentence
     assert designed.log_s <= min(2.0, 0.5 * standard.log_s) and designed.pace > standard.pace
@@ -62,7 +64,7 @@ def test_the_designed_test_is_short_and_better_per_second(
 def test_late_valves_are_told_from_a_late_sensor(tmp_path: Path, short_search: None) -> None:
     """Tests are looked for at half the rows of a log, but their valves switch when they say."""
     rows = ("valve_delay", "dt", 0.002), ("sensor_delay:piston/F", "dt", 0.002)
-    found = propose(answer(tmp_path, *rows), tmp_path / "next.yaml", bounded=False)
+    found = propose(answer(tmp_path, *rows), tmp_path / "next.yaml")
     assert found.nats > 5
 
 
@@ -133,7 +135,7 @@ def test_the_twin_agrees(tmp_path: Path, truth: str, other: str, short_search: N
     stroke = model.mechanism.stroke
     first = problem_of(machine.done(FIRST, stroke, tmp_path / "first"), model)
     rivals = fitted(first, (truth, other))
-    design = design_rig_test(model, rivals, bounded=False)
+    design = design_rig_test(model, rivals)
     assert design is not None
     assert design.designed.log_s <= 0.5 * design.standard.log_s
     logs = machine.done(design.designed.test, stroke, tmp_path / "next")

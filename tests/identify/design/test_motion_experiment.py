@@ -72,7 +72,7 @@ def test_the_twin_agrees_on_a_hip(tmp_path: Path) -> None:
     ]
     (tmp_path / "answer.json").write_text(json.dumps({"ranking": rows, "base": "planning"}))
     with patch("kemba.identify.design.robot.TRIED", 4):
-        found = propose_motion(tmp_path, tmp_path / "next.yaml", bounded=False)
+        found = propose_motion(tmp_path, tmp_path / "next.yaml")
     assert found.nats >= found.standard.least and found.nats > 1.0
     table = tmp_path / "controller.csv"
     controller(found.model, found.designed.test).write(table)

@@ -31,8 +31,7 @@ def test_the_strongest_period_has_its_phase(phase: float) -> None:
     q, v, a = np.sin(t), np.cos(t), -np.sin(t)
     wave = 2.0 * np.sin(2 * np.pi * q / 0.1 + phase)
     force = wave + 3.0 * a + 0.5 * v + 4.0 * np.sign(v) + 1.0
-    channels = SimpleNamespace(q=q, v=v, a=a, rows=slice(None))
-    log: Any = SimpleNamespace(channels=channels, doubt=np.zeros(len(t)))
+    log: Any = SimpleNamespace(q=q, v=v, a=a, rows=slice(None), doubt=np.zeros(len(t)))
     predictor: Any = SimpleNamespace(gap=lambda log, theta: -force)
     period, found = _strongest_period(predictor, (log,))
     assert period == pytest.approx(0.1, rel=0.03)

@@ -155,7 +155,7 @@ def test_states_that_are_not_asked_for_change_no_force(clean: RobotProblem) -> N
             for states in (state.states(p, delays, few), state.states(p, delays, None))
         )
         assert few_force == pytest.approx(whole, abs=1e-9 * np.abs(whole).max())
-    assert len(physics.states_at(physics.nominal)) < physics.states.count
+    assert len(physics.states_at(physics.nominal)) < len(physics.model.states)
 
 
 def test_short_predictions_take_the_time_that_they_are_said_to(
