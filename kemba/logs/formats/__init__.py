@@ -12,6 +12,7 @@ from typing import Any
 
 from kemba.errors import KembaError
 from kemba.logs.recording import Recording
+from kemba.logs.text import encoding
 from kemba.trajectory import Trajectory
 
 Read = Callable[[Path], Recording]
@@ -61,8 +62,8 @@ def check_read(path: Path) -> None:
         if ending in endings.split():
             raise KembaError(str(path), f"is {what}, which kemba does not read", hint=way_out)
     with suppress(OSError), path.open("rb") as stream:
-        start = stream.read(1024)
-        if ending not in READERS and b"\0" in start and start[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        text = b"\0" not in stream.read(1024) or encoding(path).startswith(("utf-16", "utf-32"))
+        if ending not in READERS and not text:
             expected = f"a table of text was expected, or one of .{', .'.join(READERS)}"
             raise KembaError(str(path), "is no text, and of no format that is known", expected)
 

@@ -83,6 +83,7 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
     else by number. Raises KembaError where there are none, with what the file holds."""
     arrays = {name: np.squeeze(np.asarray(value)) for name, value in content.items()}
     found: Raw = {}
+    lengths = {len(a) for a in arrays.values() if a.ndim == 1 and a.dtype.kind in "fiub"}
     for name, array in arrays.items():
         if array.dtype.names:
             arrays_of = {f"{name}/{key}": array[key] for key in array.dtype.names}
@@ -90,7 +91,11 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
                 key: a for key, a in arrays_of.items() if a.ndim == 1 and a.dtype.kind in "fiub"
             }
         elif array.dtype.kind not in "fiub":
-            if array.ndim == 1 and len(array) > 2 and seconds(array) is not None:
+            if (
+                array.ndim == 1
+                and len(array) > 2
+                and (seconds(array) is not None or len(array) in lengths)
+            ):
                 found[name] = array.astype(object)
         elif array.ndim == 1:
             found[name] = array
