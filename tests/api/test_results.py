@@ -53,6 +53,7 @@ def test_what_is_read_shows_itself_in_one_line(tmp_path: Path) -> None:
 CELLS = """
 from kemba.stopwatch import watched; watched()("fitting")
 import kemba; kemba.load_task("jump.yaml")
+from kemba.plotting.style import paper_figure; figure = paper_figure(1.0); figure
 kemba.load_task("jmp.yaml")
 kemba.plan("jump.yaml", heigth="0.4 m")
 """
@@ -66,9 +67,10 @@ def test_what_a_user_of_a_notebook_sees(tmp_path: Path) -> None:
     notebook = nbformat.v4.new_notebook(cells=cells)
     folder = {"metadata": {"path": str(tmp_path)}}
     nbclient.NotebookClient(notebook, allow_errors=True, resources=folder).execute()
-    stage, thing, *mistakes = [cell["outputs"][-1] for cell in notebook.cells]
+    stage, thing, figure, *mistakes = [cell["outputs"][-1] for cell in notebook.cells]
     assert stage["name"] == "stderr" and stage["text"].endswith(" s  fitting\n")
     assert thing["data"]["text/plain"].startswith("Task(jump: ")
+    assert "image/png" in figure["data"]
     for shown, near in zip(mistakes, ("jump.yaml", "height"), strict=True):
         assert f"did you mean '{near}'?" in shown["evalue"]
         assert len(shown["traceback"]) == 1 and "File" not in shown["traceback"][0]
