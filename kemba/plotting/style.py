@@ -45,7 +45,7 @@ def colour(index: int) -> str:
 
 
 class _Shown(Figure):
-    """A figure that notebooks show by itself: of one that pyplot did not make they give the name."""
+    """A figure that notebooks show by itself; of others without pyplot they show the name."""
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()
