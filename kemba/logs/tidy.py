@@ -29,8 +29,10 @@ def spread(found: Recording, decimal: str, where: str) -> Recording:
     """
     if found.clocks or len({len(cells) for cells in found.columns.values()}) != 1:
         return found
+    if not any(_is_text(cells) for cells in found.columns.values()):
+        return found
     columns = {n: c for n, c in found.columns.items() if not LABEL.fullmatch(n) and _differs(c)}
-    texts = {n: c for n, c in columns.items() if c.dtype == object and isinstance(c[0], str)}
+    texts = {n: c for n, c in columns.items() if _is_text(c)}
     clock = next((name for name in columns if TIME_WORD.search(name.lower().strip("_"))), "")
     names = [n for n in texts if n not in (clock, *VALUES) and n.lower() not in (*VALUES, *UNITS)]
     names = [name for name in names if len(set(texts[name])) <= MOST]
@@ -50,8 +52,14 @@ def spread(found: Recording, decimal: str, where: str) -> Recording:
     return _columns(found, clock, time, channels, values)
 
 
+def _is_text(cells: Column) -> bool:
+    return cells.dtype == object and len(cells) > 0 and isinstance(cells[0], str)
+
+
 def _differs(cells: Column) -> bool:
-    return len(cells) > 1 and len(set(cells[cells == cells].tolist())) > 1
+    """Whether not all readings are the same."""
+    known = cells[cells == cells]
+    return len(known) > 0 and bool((known != known[0]).any())
 
 
 def _time(cells: Column) -> Column | None:

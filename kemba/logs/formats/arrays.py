@@ -318,7 +318,7 @@ def _sorted_out(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     with tempfile.TemporaryDirectory(prefix="kemba-") as folder:
-        return _by_child(path, Path(folder) / "arrays.npz")
+        return _by_child(path, Path(folder) / "arrays")
 
 
 def _by_child(path: Path, written: Path) -> tuple[dict[str, Any], dict[str, Column]]:
@@ -345,9 +345,9 @@ def _by_child(path: Path, written: Path) -> tuple[dict[str, Any], dict[str, Colu
         reason = said if done.returncode > 0 else "it is damaged: its reader crashes"
         kind = "MATLAB" if matlab else "HDF5"
         raise KembaError(str(path), f"is no {kind} file that can be read: {reason}", expected)
-    with np.load(written, allow_pickle=False) as found:
-        arrays = {name: found[name] for name in found.files if name != "index"}
-        return json.loads(str(found["index"])), arrays
+    with written.open("rb") as stream:
+        index = json.loads(str(np.load(stream, allow_pickle=False)))
+        return index, {f"a{i}": np.load(stream, allow_pickle=False) for i in range(index["count"])}
 
 
 def _own(headers: list[str], content: dict[str, Any], path: Path) -> Raw:

@@ -1,8 +1,8 @@
 """A process of its own that reads a MATLAB or HDF5 file; needs NumPy, SciPy, mat-io or h5py.
 
 SciPy's reader is compiled code that trusts the file: damaged bytes may kill the process it runs in.
-Arguments: the file, and an .npz file to write: `index` (JSON: what each array is), then the
-arrays as `a0`, `a1` and so on. Exit code 1 with the reason where the file cannot be read.
+Arguments: the file, and one to write: `index` (JSON: what each array is), then the arrays, each
+as in an .npy file. Exit code 1 with the reason where the file cannot be read.
 
 What is found by walking through structs, cells and objects of any class: series, which have data
 and times (timeseries, signals of a Simulink structure with time, timetables), and loose arrays.
@@ -294,8 +294,10 @@ def main() -> int:
     for name, array in found.loose.items():
         arrays.append(array)
         index["loose"].append([name, len(arrays) - 1])
-    numbered: dict[str, Any] = {f"a{i}": array for i, array in enumerate(arrays)}
-    np.savez(sys.argv[2], index=np.array(json.dumps(index)), **numbered)
+    index["count"] = len(arrays)
+    with open(sys.argv[2], "wb") as stream:
+        for array in (np.array(json.dumps(index)), *arrays):
+            np.save(stream, array, allow_pickle=False)
     return 0
 
 
