@@ -272,6 +272,8 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
     first fault, and where foreign columns need a map.
     """
     if not path.is_dir() and path.suffix.lower() not in (*BINARY, *YAML) and columns is None:
+        if not path.is_file():
+            raise no_log(path)
         check_read(path)
         return Trajectory.read(path, strict)
     raw = raw_columns(path, columns)
@@ -295,7 +297,7 @@ def is_log_file(path: Path) -> bool:
 def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
     """All columns of a file as they are, and the metadata it holds. Raises KembaError."""
     if not path.is_file() and not is_recorded(path):
-        raise KembaError(str(path), "is a folder" if path.is_dir() else "no such file")
+        raise no_log(path)
     if path.suffix.lower() in YAML:
         endings = ", ".join((*TEXTS, *BINARY))
         raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
@@ -305,6 +307,14 @@ def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
     if layout is None:
         raise KembaError(str(path), "a column map says how to read a text table")
     return spread(read_text(path, layout), layout.decimal, str(path))
+
+
+def no_log(path: Path) -> KembaError:
+    """The error about a log that is not there, or a folder."""
+    near = list(path.parent.iterdir()) if path.parent.is_dir() else []
+    hint = suggest(path.name, [other.name for other in near if is_log_file(other)])
+    what = "is a folder" if path.is_dir() else "no such file"
+    return KembaError(str(path), what, "a log was expected", hint)
 
 
 def _binary(path: Path) -> Recording:

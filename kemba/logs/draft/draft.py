@@ -42,7 +42,7 @@ from kemba.logs.draft.words import (
     upright,
     words,
 )
-from kemba.logs.foreign import TEXTS, raw_columns, wraps
+from kemba.logs.foreign import TEXTS, is_recorded, no_log, raw_columns, wraps
 from kemba.logs.formats import check_read
 from kemba.logs.text import COMMENT, cells_of, joined, line_of, lines_of
 from kemba.trajectory import TIME, Array
@@ -220,6 +220,8 @@ def draft_map(
     """
     text = path.suffix.lower() in TEXTS and not path.is_dir()
     check_read(path)
+    if (text and not path.is_file()) or (path.is_dir() and not is_recorded(path)):
+        raise no_log(path)
     layout = layout_of(path) if text else {}
     trial = ColumnMap.model_construct(**layout)
     raw = raw_columns(path, trial)
