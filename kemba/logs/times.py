@@ -50,9 +50,12 @@ def seconds(cells: Column) -> Array | None:
 def joined(counted: Column) -> tuple[Column, int]:
     """Counts (n,) of a clock, those of a counter of 16 or 32 bit that begins anew joined, and
     after how many it does; 0 where it does not, or does not go on at its own pace."""
-    if counted.dtype.kind not in "fiu" or not np.isfinite(counted).all():
+    try:
+        whole = counted if counted.dtype.kind == "f" else counted.astype(np.int64)
+    except (OverflowError, TypeError, ValueError):  # texts, or numbers too large for any counter
         return counted, 0
-    whole = counted.astype(np.int64) if counted.dtype.kind in "iu" else counted
+    if not np.isfinite(whole).all():
+        return counted, 0
     steps = np.diff(whole)
     for turn in COUNTERS:
         turns = np.concatenate([[0], np.cumsum(steps < 0)])

@@ -164,13 +164,18 @@ def test_encodings(coded: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(back["body/z"], LOG["body/z"])
 
 
+@pytest.mark.parametrize("remark", ["", "# trigger\n"])
 @pytest.mark.parametrize("bits", [16, 32])
-def test_a_counter_that_begins_anew_is_joined_and_said(bits: int, tmp_path: Path) -> None:
+def test_a_counter_that_begins_anew_is_joined_and_said(
+    bits: int, remark: str, tmp_path: Path
+) -> None:
     ticks = (2**bits - 200 + np.round(1e3 * LOG.time).astype(int)) % 2**bits
     table().drop(columns="time").assign(tick_ms=ticks).to_csv(tmp_path / "log.csv", index=False)
+    with (tmp_path / "log.csv").open("a", encoding="utf-8") as stream:
+        stream.write(remark)
     back = read(tmp_path / "log.csv")[1]
     np.testing.assert_allclose(back.time - back.time[0], LOG.time, atol=1e-9)
-    assert f"begins anew after {2**bits}" in back.meta["read"][0]
+    assert f"begins anew after {2**bits}" in back.meta["read"][-1]
 
 
 def test_two_runs_in_one_file_are_not_joined(tmp_path: Path) -> None:
