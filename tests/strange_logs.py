@@ -123,7 +123,7 @@ def way(seed: int) -> Way:
     """A way to write a log, drawn anew per seed."""
     rng = np.random.default_rng(seed)
     some = rng.choice(list(EXTRAS), size=rng.integers(0, 5), replace=False)
-    return Way(
+    found = Way(
         seed,
         str(rng.choice(list(NAMES))),
         str(rng.choice(["none", "square", "round", "tail", "below"])),
@@ -131,6 +131,9 @@ def way(seed: int) -> Way:
         tuple(map(str, some)),
         str(rng.choice(list(FORMS))),
     )
+    if found.names == "japanese" and found.form == "mat vectors":
+        found.names = "snake"  # MATLAB's variables have names of Latin letters
+    return found
 
 
 def written(found: Way, folder: Path) -> tuple[Path, Trajectory]:
