@@ -31,6 +31,10 @@ class KembaError(Exception):
         message = ": ".join(part for part in (self.where, sentence) if part)
         return f"{message}\n{self.excerpt}" if self.excerpt else message
 
+    def _render_traceback_(self) -> list[str]:
+        """What notebooks show: the message, without the lines of the library that raised it."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class ConfigErrors(KembaError):  # noqa: N818  several errors, not one
     """All the errors of one or several files, so that they can be corrected together."""

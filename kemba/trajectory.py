@@ -136,6 +136,7 @@ def _is_number(cell: str) -> bool:
 
 
 TIME = "time [s]"
+LISTED = 4  # columns in a repr
 SAME_TIME = 1e-9  # s; times closer than this are one
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -181,7 +182,9 @@ class Trajectory:
         return self._columns[name]
 
     def __repr__(self) -> str:
-        return f"Trajectory({len(self)} rows: {', '.join(self.headers)})"
+        more = f" and {len(self.names) - LISTED} more" if len(self.names) > LISTED else ""
+        span = f", {self.time[-1] - self.time[0]:.3g} s" if len(self) else ""
+        return f"Trajectory({len(self)} rows{span}: {', '.join(self.headers[:LISTED])}{more})"
 
     def keys(self) -> tuple[str, ...]:
         """The columns' names, so that `dict(trajectory)` holds all columns."""

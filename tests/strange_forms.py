@@ -4,7 +4,7 @@ import json
 import re
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,12 @@ class Table:
     slow: set[str]
     degrees: bool = False
     below: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def wide(self) -> set[str]:
+        """Channels that reach a thousand."""
+        numbers = {n: v for n, v in self.numbers().items() if n not in self.clock}
+        return {n for n, v in numbers.items() if np.abs(v).max(initial=0.0) >= 1e3}
 
     def labelled(self) -> Columns:
         """Units in a row of their own go behind the names, where a format has no such row."""
@@ -88,6 +94,69 @@ def _topic_per_row(table: Table, path: Path) -> Path:
     return _text(",", ".", ".csv")(
         Table(columns, table.time, set(), set(), below=table.below), path
     )
+
+
+def _thousands(separator: str, decimal: str, mark: str) -> Writer:
+    """Numbers of three decimals with parted thousands."""
+
+    def write(table: Table, path: Path) -> Path:
+        trade = str.maketrans({",": mark, ".": decimal})
+        large = {n: v for n, v in table.columns.items() if v.dtype.kind == "f" and n in table.wide}
+        cells = {n: [f"{x:,.3f}".translate(trade) for x in v] for n, v in large.items()}
+        columns = {n: np.array(cells.get(n, v), dtype=cells.get(n) and object)
+                   for n, v in table.columns.items()}  # fmt: skip
+        return _text(separator, decimal, ".csv")(replace(table, columns=columns), path)
+
+    return write
+
+
+def _remarks_between(table: Table, path: Path) -> Path:
+    """A remark and the header again between the rows, a line below them."""
+    path = _text(",", ".", ".csv")(table, path)
+    lines = path.read_text(encoding="utf-8").rstrip("\n").split("\n")
+    lines[300:300] = ["# trigger, by hand", lines[0]]
+    path.write_text("\n".join([*lines, "", "End of file", "\0" * 64]), encoding="utf-8")
+    return path
+
+
+def _merged(table: Table, path: Path) -> Path:
+    """Names in two rows; the upper one names the first column of each group alone."""
+    path = _text(";", ",", ".csv")(table, path)
+    first, *lines = path.read_text(encoding="utf-8").split("\n")
+    parts = [name.rpartition("_") for name in first.split(";")]
+    upper = [
+        head if i == 0 or head != parts[i - 1][0] else "" for i, (head, _, _) in enumerate(parts)
+    ]
+    if not all(head for head, _, _ in parts):  # what has no group would get the one before it
+        return path
+    lower = [last for _, _, last in parts]
+    path.write_text("\n".join([";".join(upper), ";".join(lower), *lines]), encoding="utf-8")
+    return path
+
+
+def _long(ending: str) -> Writer:
+    """One row for each time, channel and reading; slow channels in a tenth of them."""
+
+    def write(table: Table, path: Path) -> Path:
+        path = path.with_suffix(ending)
+        numbers = {n: v for n, v in table.labelled().items() if v.dtype.kind in "fi"}
+        labelled = [
+            n for n in numbers if n.split(" [")[0] not in table.clock and n not in table.clock
+        ]
+        parts = []
+        for name in labelled:
+            rows = slice(None, None, EVERY if name in table.slow else 1)
+            parts.append(
+                pd.DataFrame({"time": table.time[rows], "name": name, "value": numbers[name][rows]})
+            )
+        frame = pd.concat(parts).sort_values("time", kind="stable")
+        if ending == ".parquet":
+            frame.to_parquet(path)
+        else:
+            frame.to_csv(path, index=False)
+        return path
+
+    return write
 
 
 def _parquet(table: Table, path: Path) -> Path:
@@ -318,6 +387,12 @@ FORMS: dict[str, Writer] = {
     "marked": _text(";", ".", ".csv", "utf-8-sig"),
     "unicode": _text("\t", ",", ".txt", "utf-16"),
     "topic per row": _topic_per_row,
+    "remarks between": _remarks_between,
+    "merged header": _merged,
+    "thousands": _thousands(";", ".", ","),
+    "thousands comma": _thousands(";", ",", "."),
+    "long": _long(".csv"),
+    "long parquet": _long(".parquet"),
     "parquet": _parquet,
     "npz": _npz,
     "json": _json,

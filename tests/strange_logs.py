@@ -74,17 +74,36 @@ NAMES: dict[str, dict[str, str]] = {
                  "hip/q": "motor state ({L}).q", "hip/tau": "motor command ({L}).tau",
                  "piston/x": "piston state ({L}).p", "valve/extend": "piston command ({L}).ue",
                  "valve/retract": "piston command ({L}).ur"},
+    "french": {"body/x": "Corps position x", "body/z": "Hauteur du corps",
+               "body/pitch": "Tangage", "hip/q": "Angle hanche {avant}",
+               "hip/tau": "Couple hanche {avant}", "piston/x": "Course vérin {avant}",
+               "valve/extend": "Électrovanne {avant} sortie",
+               "valve/retract": "Électrovanne {avant} rentrée"},
+    "japanese": {"body/x": "胴体_x", "body/z": "胴体_高さ", "body/pitch": "胴体_ピッチ",
+                 "hip/q": "{mae}股関節_角度", "hip/tau": "{mae}股関節_トルク",
+                 "piston/x": "{mae}シリンダ_位置", "valve/extend": "{mae}電磁弁_伸",
+                 "valve/retract": "{mae}電磁弁_縮"},
+    "joined": {"body/x": "BODYX", "body/z": "BODYHEIGHT", "body/pitch": "BODYPITCH",
+               "hip/q": "HIPANGLE{LEG}", "hip/tau": "HIPTORQUE{LEG}",
+               "piston/x": "PISTONPOS{LEG}", "valve/extend": "VALVEEXT{LEG}",
+               "valve/retract": "VALVERET{LEG}"},
+    "compounds": {"body/x": "Rumpfweg_x", "body/z": "Rumpfhöhe", "body/pitch": "Rumpfneigung",
+                  "hip/q": "Hüftwinkel_{bein}", "hip/tau": "Hüftmoment_{bein}",
+                  "piston/x": "Kolbenweg_{bein}", "valve/extend": "Ventil_ausfahren_{bein}",
+                  "valve/retract": "Ventil_einfahren_{bein}"},
     "numbered": {"body/x": "ch_a", "body/z": "ch_b", "body/pitch": "ch_c", "hip/q": "ch_d{n}",
                  "hip/tau": "ch_e{n}", "piston/x": "ch_f{n}", "valve/extend": "ch_g{n}",
                  "valve/retract": "ch_h{n}"},
 }  # fmt: skip
 BEIN = {"front": "vorne", "rear": "hinten"}
+AVANT = {"front": "avant", "rear": "arrière"}
+MAE = {"front": "前", "rear": "後"}
 UNITS = {  # ours -> how it is written, and how many of it one of ours is
     "m": [("m", 1.0), ("mm", 1e3), ("cm", 1e2), ("mm/10", 1e4), ("1e-4 m", 1e4), ("um", 1e6)],
     "rad": [("rad", 1.0), ("deg", np.degrees(1)), ("deg/100", np.degrees(100)), ("mrad", 1e3)],
     "N.m": [("Nm", 1.0), ("N.m", 1.0), ("Nm/10", 10.0), ("mNm", 1e3), ("N m", 1.0)],
 }
-DOTTED = ("words", "dotted", "topics")  # names that take no unit as another word
+DOTTED = ("words", "dotted", "topics", "french")  # names that take no unit as another word
 PLAIN = {"m": UNITS["m"][:2], "rad": UNITS["rad"][:2], "N.m": [("Nm", 1.0)]}
 
 
@@ -104,7 +123,7 @@ def way(seed: int) -> Way:
     """A way to write a log, drawn anew per seed."""
     rng = np.random.default_rng(seed)
     some = rng.choice(list(EXTRAS), size=rng.integers(0, 5), replace=False)
-    return Way(
+    found = Way(
         seed,
         str(rng.choice(list(NAMES))),
         str(rng.choice(["none", "square", "round", "tail", "below"])),
@@ -112,6 +131,9 @@ def way(seed: int) -> Way:
         tuple(map(str, some)),
         str(rng.choice(list(FORMS))),
     )
+    if found.names == "japanese" and found.form == "mat vectors":
+        found.names = "snake"  # MATLAB's variables have names of Latin letters
+    return found
 
 
 def written(found: Way, folder: Path) -> tuple[Path, Trajectory]:
@@ -166,7 +188,8 @@ def noisy(rng: Rng, rows: int = 420) -> Trajectory:
 def _name(scheme: str, name: str) -> str:
     leg = next((leg for leg in LEGS if name.startswith(leg)), "")
     form = NAMES[scheme][name.removeprefix(f"{leg}/")]
-    return form.format(leg=leg, Leg=leg.title(), bein=BEIN.get(leg, ""), l=leg[:1].upper(),
+    return form.format(leg=leg, Leg=leg.title(), LEG=leg.upper(), avant=AVANT.get(leg, ""),
+                       mae=MAE.get(leg, ""), bein=BEIN.get(leg, ""), l=leg[:1].upper(),
                        L=leg[:1].upper(), n=LEGS.index(leg) if leg else "")  # fmt: skip
 
 
@@ -209,6 +232,11 @@ CLOCKS: dict[str, Callable[[Trajectory], dict[str, np.ndarray]]] = {
     "compact": lambda log: {"stamp": _strings(log, "%Y%m%d_%H%M%S.%f")},
     "days": lambda log: {"datenum [day]": log.time / 86_400.0},
     "days since": lambda log: {"Date [d]": 46_010.0 + log.time / 86_400.0},
+    "excel": lambda log: {"Date": 46_010.5 + log.time / 86_400.0},
+    "ctime": lambda log: {"Time": _strings(log, "%a %b %d %H:%M:%S.%f %Y")},
+    "named zone": lambda log: {"Time": _strings(log, "%Y-%m-%d %H:%M:%S.%f CET")},
+    "kanji": lambda log: {"時刻": _strings(log, "%Y年%m月%d日 %H:%M:%S.%f")},
+    "rolled": lambda log: {"micros": (2**32 - 200_000 + (1e6 * log.time).astype(int)) % 2**32},
     "milliseconds": lambda log: {"epoch_ms": _ns(log) / 1e6},
     "zone": lambda log: {"timestamp": _strings(log, "%Y-%m-%d %H:%M:%S.%f+01:00")},
     "month": lambda log: {"Date": _strings(log, "%b %d, %Y %H:%M:%S.%f")},

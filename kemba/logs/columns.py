@@ -92,6 +92,9 @@ class ColumnMap(Section):
     header: bool | Annotated[int, Field(ge=1, le=9)] = Field(
         True, description="false: no header, sources are column numbers; 2: names in two rows"
     )
+    missing: tuple[Number, ...] = Field(
+        (), description="texts and numbers that say that there is no reading: `[OVER, 9999]`"
+    )
     origin: Literal["first"] | None = Field(
         None, description="`first`: time counts from the first row, as for stamps since 1970"
     )

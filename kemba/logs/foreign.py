@@ -21,7 +21,8 @@ from kemba.logs import times
 from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
 from kemba.logs.formats import READERS, UNREAD, check_read, reader
 from kemba.logs.recording import Column, Raw, Recording
-from kemba.logs.text import as_numbers, first_row, read_text
+from kemba.logs.text import as_numbers, line_of, read_text, without
+from kemba.logs.tidy import spread
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory, check_headers, check_times, sidecar
 
@@ -34,7 +35,7 @@ def mapped(raw: Recording, layout: ColumnMap, path: Path) -> Trajectory:
     """
     reader = _Reader(raw, layout, path)
     time = reader.time()
-    found, said = {}, list(raw.remarks)
+    found, said = {}, [*raw.remarks, *reader.said]
     slower = []
     for header, source in layout.columns.items():
         if header == TIME:
@@ -85,6 +86,7 @@ class _Reader:
 
     def __init__(self, raw: Recording, layout: ColumnMap, path: Path) -> None:
         self.raw, self.layout, self.path = raw, layout, path
+        self.said: list[str] = []
 
     def time(self) -> Array:
         """The time (n,) in s. Stamps are counted from the first before they become floats."""
@@ -95,9 +97,12 @@ class _Reader:
         if written is not None:
             values = written
         else:
+            self._check_texts(name)
             values = np.zeros(len(self.raw.columns[name]))
             for part, at in zip((source, source.add), source.names, strict=False):
-                counted = self._column(TIME, at)
+                counted, turn = times.joined(self._column(TIME, at))
+                if turn:
+                    self.said.append(f"{TIME}: '{at}' begins anew after {turn}: joined")
                 counted = counted - (counted[0] if from_first and len(counted) else 0)
                 counted = counted.astype(float)
                 values = values + self._converted(TIME, part or source, counted)
@@ -167,6 +172,15 @@ class _Reader:
         cells = self.raw.columns[name]
         return cells.dtype == object and any(isinstance(cell, str) for cell in cells[:3])
 
+    def _check_texts(self, name: str) -> None:
+        """Raise KembaError where a cell is no time and most others are."""
+        cells = self.raw.columns[name]
+        if not self._is_text(name) or times.seconds(cells[:2]) is None:
+            return
+        odd = next((i for i, cell in enumerate(cells) if times.seconds(cells[[0, i]]) is None), 0)
+        if odd:
+            raise KembaError(self._place(name, odd), f"{name}: '{cells[odd]}' is no time")
+
     def _column(self, header: str, source: Named) -> Column:
         """The cells (n,): whole numbers as they are, which a float may not hold."""
         name = self._name(header, source)
@@ -183,18 +197,33 @@ class _Reader:
     def _numbers(self, header: str, source: Named) -> Array:
         name = self._name(header, source)
         cells = self.raw.columns[name]
-        return self._as_numbers(cells, name) if cells.dtype == object else cells.astype(float)
+        if cells.dtype == object:
+            return self._as_numbers(cells, name)
+        return self._finite(without(cells.astype(float), self.layout.missing), cells, name)
 
     def _as_numbers(self, cells: Column, name: str) -> Array:
-        numbers, wrong = as_numbers(cells, self.layout.decimal)
+        numbers, wrong = as_numbers(cells, self.layout.decimal, self.layout.missing)
         if wrong.any():
-            row, column = int(np.argmax(wrong)), list(self.raw.columns).index(name) + 1
-            hint = "`decimal`, `separator` and `skip_below` of the map" if wrong.all() else ""
-            text = isinstance(cells[row], str) and self.path.suffix.lower() in TEXTS
-            line = row + (first_row(self.path, self.layout) if text else 1)
-            where = f"{self.path}:{line}:{column}"
+            row = int(np.argmax(wrong))
+            known = f"if it means that there is no reading, `missing: [{cells[row]}]` in the map"
+            hint = "`decimal`, `separator` and `skip_below` of the map" if wrong.all() else known
+            where = self._place(name, row)
             raise KembaError(where, f"{name}: '{cells[row]}' is not a number", hint=hint)
+        return self._finite(numbers, cells, name)
+
+    def _finite(self, numbers: Array, cells: Column, name: str) -> Array:
+        """Numbers (n,). Raises KembaError where one is infinite."""
+        if (wrong := np.isinf(numbers)).any():
+            row = int(np.argmax(wrong))
+            hint = f"if it means that there is no reading, `missing: [{cells[row]}]` in the map"
+            raise KembaError(self._place(name, row), f"{name}: the number is infinite", hint=hint)
         return numbers
+
+    def _place(self, name: str, row: int) -> str:
+        """A cell of the file, by row and column from 1."""
+        text = self.path.suffix.lower() in TEXTS
+        line = line_of(self.path, self.layout, row) if text else row + 1
+        return f"{self.path}:{line}:{list(self.raw.columns).index(name) + 1}"
 
 
 def pitch(x: Array, y: Array, z: Array, w: Array) -> Array:
@@ -243,6 +272,8 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
     first fault, and where foreign columns need a map.
     """
     if not path.is_dir() and path.suffix.lower() not in (*BINARY, *YAML) and columns is None:
+        if not path.is_file():
+            raise no_log(path)
         check_read(path)
         return Trajectory.read(path, strict)
     raw = raw_columns(path, columns)
@@ -266,16 +297,24 @@ def is_log_file(path: Path) -> bool:
 def raw_columns(path: Path, layout: ColumnMap | None) -> Recording:
     """All columns of a file as they are, and the metadata it holds. Raises KembaError."""
     if not path.is_file() and not is_recorded(path):
-        raise KembaError(str(path), "is a folder" if path.is_dir() else "no such file")
+        raise no_log(path)
     if path.suffix.lower() in YAML:
         endings = ", ".join((*TEXTS, *BINARY))
         raise KembaError(str(path), "is a YAML file", f"a log was expected: {endings}")
     check_read(path)
     if path.is_dir() or path.suffix.lower() in BINARY:
-        return _binary(path)
+        return spread(_binary(path), ".", str(path))
     if layout is None:
         raise KembaError(str(path), "a column map says how to read a text table")
-    return Recording(read_text(path, layout))
+    return spread(read_text(path, layout), layout.decimal, str(path))
+
+
+def no_log(path: Path) -> KembaError:
+    """The error about a log that is not there, or a folder."""
+    near = list(path.parent.iterdir()) if path.parent.is_dir() else []
+    hint = suggest(path.name, [other.name for other in near if is_log_file(other)])
+    what = "is a folder" if path.is_dir() else "no such file"
+    return KembaError(str(path), what, "a log was expected", hint)
 
 
 def _binary(path: Path) -> Recording:

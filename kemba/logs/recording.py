@@ -107,14 +107,11 @@ def by_length(vectors: Mapping[str, Column]) -> Recording:
 
 
 def _clock_of(vectors: Mapping[str, Column], length: int) -> str | None:
-    return next(
-        (
-            name
-            for name, values in vectors.items()
-            if len(values) == length > 2
-            and TIME_WORD.search(name)
-            and values.dtype.kind in "fiu"
-            and bool(np.all(np.diff(values) > 0))
-        ),
-        None,
-    )
+    clocks = (n for n, values in vectors.items() if len(values) == length and is_clock(n, values))
+    return next(clocks, None)
+
+
+def is_clock(name: str, values: Column) -> bool:
+    """Whether a vector (n,) is called a time and rises."""
+    numbers = values.ndim == 1 and len(values) > 2 and values.dtype.kind in "fiu"
+    return bool(numbers and TIME_WORD.search(name) and np.all(np.diff(values) > 0))

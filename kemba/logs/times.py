@@ -10,16 +10,14 @@ from kemba.trajectory import Array, Trajectory
 
 CLOCK = re.compile(
     r"(?:(?P<days>[+-]?\d+) days?,? *)?(?P<sign>[+-])?(?:(?P<hour>\d{1,2}):)?(?P<minute>\d{1,2}):"
-    r"(?P<second>\d{1,2})(?P<rest>[.,:]\d+)? *(?P<half>[AaPp][Mm])?(?P<zone>Z|[+-]\d\d:?\d\d)?"
+    r"(?P<second>\d{1,2})(?P<rest>[.,:]\d+)? *(?P<half>[AaPp][Mm])?"
+    r" *(?P<zone>Z|[A-Z]{3,4}|[+-]\d\d:?\d\d)?(?: +\d{4})?"  # a year behind, as of C's ctime
 )
 COMPACT = re.compile(r"\d{8}[T_ -]?(\d\d)(\d\d)(\d\d)([.,]\d+)?")
-DATE = re.compile(
-    r"(?:[A-Za-z]{3,9},? +)?"  # a day of the week
-    r"(?:\d{1,4}[-./]\d{1,2}[-./]\d{1,4}|\d{1,2}[- ][A-Za-z]{3,9}[- ,]+\d{2,4}"
-    r"|[A-Za-z]{3,9} +\d{1,2},? +\d{4})"
-    r"(?:,? +|T|_)"
-)
+# a date of any language: what has a number and no colon, apart from the clock
+DATE = re.compile(r"[^:]*\d[^:]*?(?:[^\w:+-]|(?<=\d)T|_)(?=\d)")
 DAY, HOUR = 86_400.0, 3_600.0
+COUNTERS = (2**16, 2**32)  # after so many counts clocks of controllers begin anew
 PART = re.compile(
     r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*(?P<unit>[a-zµ]+)\s*", re.IGNORECASE
 )
@@ -47,6 +45,26 @@ def seconds(cells: Column) -> Array | None:
         return found
     counted = _read(texts, max(widths) - 1)  # less the mark
     return counted if counted is not None and _forward(counted) else found
+
+
+def joined(counted: Column) -> tuple[Column, int]:
+    """Counts (n,) of a clock, those of a counter of 16 or 32 bit that begins anew joined, and
+    after how many it does; 0 where it does not, or does not go on at its own pace."""
+    try:
+        whole = counted if counted.dtype.kind == "f" else counted.astype(np.int64)
+    except (OverflowError, TypeError, ValueError):  # texts, or numbers too large for any counter
+        return counted, 0
+    if not np.isfinite(whole).all():
+        return counted, 0
+    steps = np.diff(whole)
+    for turn in COUNTERS:
+        turns = np.concatenate([[0], np.cumsum(steps < 0)])
+        found = whole + turn * turns
+        pace = LONGEST * np.median(np.abs(steps)) if len(steps) else 0.0
+        falls = np.diff(found)[steps < 0]
+        if len(falls) and whole.max() < turn and np.all((falls > 0) & (falls < pace)):
+            return found, turn
+    return counted, 0
 
 
 def _forward(times: Array) -> bool:
@@ -77,8 +95,11 @@ def _read(texts: Sequence[str], digits: int = 0) -> Array | None:
 
 def _match(text: str) -> re.Match[str] | None:
     """The clock of day in a text, behind its date."""
+    text = text.strip("[]() ")
+    if clock := CLOCK.fullmatch(text):
+        return clock
     date = DATE.match(text)
-    return CLOCK.fullmatch(text[date.end() :] if date else text)
+    return CLOCK.fullmatch(text[date.end() :]) if date else None
 
 
 def _clock(text: str, digits: int = 0) -> tuple[float, float, str] | None:

@@ -107,6 +107,11 @@ class Model:
         self.inputs = self._variables("inputs")
         self.forces = self._variables("forces")
 
+    def __repr__(self) -> str:
+        count = len(self.effects)
+        of = f"{count} effect{'s' * (count != 1)}, air of {self.supply / 1e6:.3g} MPa"
+        return f"Model({self.name}: {of})"
+
     def _variables(self, role: str) -> dict[Key, Quantity]:
         found: dict[Key, Quantity] = {}
         for instance in self.instances:

@@ -29,7 +29,14 @@ from kemba.ocp.relaxation.session import Schedule, Session, Stopped
 from kemba.ocp.relaxation.settings import Grids
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.symmetry import Reduction, find_symmetry, mirrored_requirements, whole
+from kemba.ocp.transcription.symmetry import (
+    Reduction,
+    equal_legs,
+    find_symmetry,
+    met_alike,
+    mirrored_requirements,
+    whole,
+)
 from kemba.ocp.transcription.transcribe import Transcription
 from kemba.trajectory import Trajectory
 
@@ -71,11 +78,15 @@ class Planner:
     def schedule(self, nodes: int, reduction: Reduction) -> Schedule:
         """A fresh program on a grid of `nodes`; of half a robot, for what is asked of both legs
         alike."""
-        requirements = self.alike if reduction.symmetric else self.requirements
+        if reduction is self.one_leg:
+            requirements = met_alike(self.model, self.requirements, reduction)
+        else:
+            requirements = self.alike if reduction.symmetric else self.requirements
         with self.session.building.running():
             program = Transcription(self.model, self.task, requirements, reduction, nodes)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         name = "half" if reduction.symmetric else "whole"
+        name = "one leg for all of the" if reduction is self.one_leg else name
         where = f" ({name} robot, {nodes} nodes)"
         return self.session.schedule(program, options, where, self.pulse)
 
@@ -88,6 +99,11 @@ class Planner:
     def half(self) -> Reduction | None:
         """Half the robot, where the model is its own mirror image and symmetry may be used."""
         return find_symmetry(self.model) if self.task.solver.symmetry else None
+
+    @cached_property
+    def one_leg(self) -> Reduction | None:
+        """One leg for all of a robot with more than two, where symmetry may be used."""
+        return equal_legs(self.model) if self.task.solver.symmetry else None
 
     @cached_property
     def alike(self) -> list[Requirement]:
@@ -142,8 +158,11 @@ class Planner:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess."""
         t = schedule.transcription
-        if self.half is not None and self.together and self.alike != self.requirements:
-            half = self.schedule(t.nodes, self.half)
+        fewer = self.one_leg
+        if self.half is not None and self.alike != self.requirements:
+            fewer = self.half
+        if fewer is not None and self.together:
+            half = self.schedule(t.nodes, fewer)
             point = find(half, self.guess(half.transcription))
             if point.solved:
                 point = grow(schedule, half.transcription, point, self.guess(t))

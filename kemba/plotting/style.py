@@ -22,6 +22,7 @@ from kemba.plotting.source import Source
 
 WIDTH = 7.0  # in, both columns of a paper
 DPI = 200  # of a PNG
+SCREEN = 100  # of one in a notebook
 
 # Okabe and Ito's palette without its yellow, which is lost on white
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLACK = (
@@ -43,9 +44,19 @@ def colour(index: int) -> str:
     return COLOURS[index % len(COLOURS)]
 
 
+class _Shown(Figure):
+    """A figure that notebooks show by itself; of others without pyplot they show the name."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        with matplotlib.rc_context(RC):
+            self.savefig(buffer, format="png", dpi=SCREEN, facecolor="white")
+        return buffer.getvalue()
+
+
 def paper_figure(height: float, width: float = WIDTH, figure: Figure | None = None) -> Figure:
     """An empty figure [in], or `figure` (one that pyplot can show) resized."""
-    figure = figure or Figure()
+    figure = figure or _Shown()
     figure.set_size_inches(width, height)
     figure.set_layout_engine("constrained")
     return figure

@@ -3,9 +3,11 @@
 import io
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import kemba
+import kemba.trajectory
 from kemba.api.learning import Discovered
 from kemba.api.planning import Planned
 from kemba.errors import KembaError
@@ -33,6 +35,45 @@ def test_progress_is_shown_where_someone_watches(
     tell("fitting")
     assert screen.getvalue() == ("   0.0 s  fitting\n" if there else "")
     assert (tell is silent) is not there
+
+
+def test_what_is_read_shows_itself_in_one_line(tmp_path: Path) -> None:
+    log = kemba.trajectory.Trajectory(
+        np.arange(3.0), {f"leg{i}/hip/q [rad]": np.zeros(3) for i in range(9)}
+    )
+    for thing, start in (
+        (log, "Trajectory(3 rows, 2 s: leg0/hip/q [rad], leg1"),
+        (kemba.load_task("jump.yaml"), "Task(jump: 0.7 s, 0.5 m high, 100 nodes, model planning)"),
+        (kemba.load_model("planning"), "Model(planning: "),
+    ):
+        assert repr(thing).startswith(start), repr(thing)
+        assert "\n" not in repr(thing) and len(repr(thing)) < 120
+
+
+CELLS = """
+from kemba.stopwatch import watched; watched()("fitting")
+import kemba; kemba.load_task("jump.yaml")
+from kemba.plotting.style import paper_figure; figure = paper_figure(1.0); figure
+kemba.load_task("jmp.yaml")
+kemba.plan("jump.yaml", heigth="0.4 m")
+"""
+
+
+@pytest.mark.slow
+def test_what_a_user_of_a_notebook_sees(tmp_path: Path) -> None:
+    """In a kernel: stages on the way, one line for a thing, one for a mistake."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    cells = [nbformat.v4.new_code_cell(text) for text in CELLS.strip().splitlines()]
+    notebook = nbformat.v4.new_notebook(cells=cells)
+    folder = {"metadata": {"path": str(tmp_path)}}
+    nbclient.NotebookClient(notebook, allow_errors=True, resources=folder).execute()
+    stage, thing, figure, *mistakes = [cell["outputs"][-1] for cell in notebook.cells]
+    assert stage["name"] == "stderr" and stage["text"].endswith(" s  fitting\n")
+    assert thing["data"]["text/plain"].startswith("Task(jump: ")
+    assert "image/png" in figure["data"]
+    for shown, near in zip(mistakes, ("jump.yaml", "height"), strict=True):
+        assert f"did you mean '{near}'?" in shown["evalue"]
+        assert len(shown["traceback"]) == 1 and "File" not in shown["traceback"][0]
 
 
 def test_an_answer_without_a_folder_is_not_adopted(tmp_path: Path) -> None:

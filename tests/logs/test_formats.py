@@ -283,7 +283,8 @@ def test_the_folder_of_a_recording_is_one_log(tmp_path: Path) -> None:
     ("name", "what", "way_out"),
     [
         ("a.bag", "is a bag of ROS 1", "rosbags-convert"),
-        ("a.hdf5", "is an HDF5 file", "-v7.3"),
+        ("a.nc", "is a NetCDF file", "Parquet"),
+        ("a.hdf5", "is no HDF5 file", "an array for each column"),
         ("a.feather", "is an Arrow file", "Parquet"),
         ("a.XLSX", "is a workbook", "CSV"),
         ("a.csv.gz", "is packed", "unpack"),

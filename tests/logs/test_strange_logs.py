@@ -271,15 +271,43 @@ def test_marks_of_missing_readings(mark: str, tmp_path: Path) -> None:
     assert np.flatnonzero(np.isnan(read_log(path, load_map(target))["body/z"])).tolist() == [7]
 
 
-@pytest.mark.parametrize("line", ["header", "End of log"])
-def test_a_line_that_is_no_data_is_told_where_it_stands(line: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("line", ["header", "End of log", "# trigger, by hand", "\0" * 40])
+@pytest.mark.parametrize("at", [200, 401])
+@pytest.mark.parametrize("dated", [True, False])
+def test_a_line_that_is_no_row_is_left_out_and_said(
+    line: str, at: int, dated: bool, tmp_path: Path
+) -> None:
+    dates = pd.date_range("2026-01-05", periods=400, freq="ms").strftime("%d.%m.%Y %H:%M:%S.%f")
+    path, frame = plain_log(tmp_path, {"time": dates} if dated else {})
+    text = frame.to_csv(index=False).split("\n")
+    text.insert(at, text[0] if line == "header" else line)
+    path.write_text("\n".join(text))
+    target = tmp_path / "map.yaml"
+    draft = draft_map(path, ("front", "rear"), 0.07)
+    target.write_text(draft.text(path.name))
+    back = read_log(path, load_map(target))
+    assert not draft.questions and not draft.missing
+    np.testing.assert_allclose(back["body/z"], frame["body_z"])
+    assert "lines that are no rows are left out" in back.meta["read"][0]
+    cells = text[300].split(",")
+    text[300] = ",".join([*cells[:2], "x", *cells[3:]])
+    path.write_text("\n".join(text))
+    with pytest.raises(KembaError, match=r"log.csv:301:3: .*'x' is not a number.*missing: \[x\]"):
+        read_log(path, load_map(target))
+
+
+def test_a_cell_that_is_no_time_is_told_where_it_stands(tmp_path: Path) -> None:
     dates = pd.date_range("2026-01-05", periods=400, freq="ms").strftime("%d.%m.%Y %H:%M:%S.%f")
     path, frame = plain_log(tmp_path, {"time": dates})
-    text = frame.to_csv(index=False).split("\n")
-    text.insert(200, text[0] if line == "header" else line)
-    path.write_text("\n".join(text))
-    with pytest.raises(KembaError, match=r"log.csv:201: '.*' stands in .* other cells are times"):
+    frame.loc[199, "time"] = "pause"
+    frame.to_csv(path, index=False)
+    with pytest.raises(
+        KembaError, match=r"log.csv:201: 'pause' stands in .* other cells are times"
+    ):
         draft_map(path, ("front", "rear"), 0.07)
+    columns = {"time [s]": {"source": "time"}, "body/z [m]": {"source": "body_z"}}
+    with pytest.raises(KembaError, match=r"log.csv:201:1: time: 'pause' is no time"):
+        read_log(path, ColumnMap(columns=columns))
 
 
 def test_of_two_torques_the_commanded_one_is_taken(tmp_path: Path) -> None:

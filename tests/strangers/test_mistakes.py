@@ -52,6 +52,28 @@ def test_a_mistake_is_answered_at_its_line(name: str, tmp_path: Path) -> None:
     assert len(said.splitlines()) <= 6, "a mistake is not buried"
 
 
+# what is typed in a folder with the log jump.csv, and the sentence
+TYPED = {
+    "map jmp.csv": "jmp.csv: no such file; a log was expected; did you mean 'jump.csv'?",
+    "map .": ".: is a folder; a log was expected; one of: jump.csv",
+    "compare jmp.csv": "jmp.csv: no such file; a log was expected; did you mean 'jump.csv'?",
+    "check jump.csv": "draft a column map: kemba-opt map jump.csv",
+    "discover jump.csv --map nomap.yaml": "nomap.yaml: no such file",
+    "solve jumb.yaml": "did you mean 'jump.yaml'?",
+    "simulate run-9": "run-9: no such run folder or table; make one with: kemba-opt solve",
+    "adopt answr": "answr: holds no answer.json; make one with: kemba-opt discover",
+    "effects seal_fricton": "did you mean 'seal_friction'?",
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("command", TYPED)
+def test_a_mistyped_command_is_answered(command: str, tmp_path: Path) -> None:
+    (tmp_path / "jump.csv").write_text("t,height\n" + "0.1,2\n" * 9, encoding="utf-8")
+    said = typed(f"kemba-opt {command}", tmp_path, code=2)
+    assert TYPED[command] in said and "Traceback" not in said
+
+
 def test_hard_sentences_stand_nowhere_in_the_source() -> None:
     """Those that are one text in the code; for those that are put together the walks look."""
     words = ["gives different values", "within their usual tolerance", "tolerance asked for"]

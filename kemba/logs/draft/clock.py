@@ -1,17 +1,20 @@
 """Which column is the time: all candidates, scored, the best with its reason."""
 
 import re
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from kemba.logs import times
+from kemba.logs.columns import Number
 from kemba.logs.draft import matching
 from kemba.logs.draft.words import Names, named_unit, says_time, words
+from kemba.logs.foreign import held
 from kemba.logs.recording import Raw
-from kemba.logs.text import as_numbers
+from kemba.logs.text import OFF, ON, as_numbers, without
 from kemba.quantity import convert
 from kemba.trajectory import Array
 
@@ -19,6 +22,11 @@ FIELDS = ("position", "velocity", "effort")
 REPEATED = 0.15  # share of rising steps where up to six topics have rows of one stamp
 RISING = 0.99  # share of steps that must rise: a few repeats are for the gate to tell
 ODD = 0.05  # share of the cells of a column that may be of another kind than the others
+SEVERAL = 6  # different values make a channel, no switch; so many words may say `no reading`
+FAR = 5.0  # times the largest other reading; a number of nines beyond it is none
+NINES = re.compile(r"-?9{2,}(?:\.9+)?")
+# the last numbers of 15, 16, 31 and 32 bit, which converters give where they have no reading
+LAST = frozenset(float(s * 2**n - 1 + (s < 0)) for s in (1, -1) for n in (15, 16, 31, 32))
 STAMPED = 1e8  # s; larger first stamps count from 1970 (three years) or from the start of a clock
 ALIKE = 0.02  # share by which two clocks of one log may differ
 SURE = (5e-5, 0.05)  # s between rows that leave no doubt about a time in s
@@ -53,19 +61,55 @@ class Clock:
     question: str = ""
 
 
-def numbers(raw: Raw, decimal: str) -> dict[str, Array]:
-    """The columns (n,) that hold numbers; texts are left out."""
+def numbers(raw: Raw, decimal: str, missing: Collection[Number] = ()) -> dict[str, Array]:
+    """The columns (n,) that hold numbers; those of texts are left out."""
     found = {}
     for name, cells in raw.items():
-        values = as_numbers(cells, decimal)[0] if cells.dtype == object else cells.astype(float)
-        if np.isfinite(values).any():
+        if cells.dtype == object:
+            values, wrong = as_numbers(cells, decimal, missing)
+        else:
+            values, wrong = without(cells.astype(float), missing), np.zeros(1)
+        if np.isfinite(values).any() and wrong.mean() < ODD:
             found[name] = values
     return found
 
 
-def odd_cell(raw: Raw, decimal: str) -> tuple[str, int, str] | None:
-    """A column, a row of it from 0 whose text is another thing than nearly all others, and what
-    these are."""
+def no_readings(raw: Raw, decimal: str) -> list[Number]:
+    """What stands in columns of numbers where there is no reading: a word that is there again and
+    again, the infinite, and a number of nines, or the last of 16 or 32 bit, far from all others."""
+    found: dict[Number, None] = {}
+    for cells in raw.values():
+        if cells.dtype == object:
+            values, wrong = as_numbers(cells, decimal)
+            texts = Counter(str(cell).strip() for cell in cells[wrong])
+            known = len(np.unique(values[np.isfinite(values)]))
+            if wrong.mean() < 0.5 and known > SEVERAL >= len(texts):
+                found |= dict.fromkeys(t for t, n in texts.items() if n > 1 and _is_word(t))
+        else:
+            values = cells.astype(float)
+        infinite = values[np.isinf(values)]
+        found |= dict.fromkeys(map(str, infinite[:1]))
+        values = values[np.isfinite(values)]
+        for value in {float(values.min()), float(values.max())} if len(values) else ():
+            rest = values[values != value]
+            if value in LAST or NINES.fullmatch(f"{value:g}"):
+                far = abs(value) > FAR * np.abs(rest).max(initial=0.0)
+                if far and len(rest) < len(values) - 1 and len(np.unique(rest)) > SEVERAL:
+                    found[int(value) if value % 1 == 0 else value] = None
+    return list(found)
+
+
+def _is_word(text: str) -> bool:
+    return not any(map(str.isdigit, text)) and times.seconds(np.array([text] * 2)) is None
+
+
+def no_time(raw: Raw, values: Mapping[str, Array], decimal: str) -> tuple[str, str, str, int]:
+    """Why none of the columns (n,) is a time, what to do, and the column and row from 0 where it
+    shows; no column, and -1, where it shows at none."""
+    rows = len(next(iter(raw.values()), ()))
+    if len(raw) > max(5 * rows, SEVERAL):
+        turned = "pandas.read_csv(FILE, header=None, index_col=0).T.to_csv(FILE, index=False)"
+        return "it lies on its side: its channels are rows", turned, "", -1
     for name, cells in raw.items():
         if cells.dtype != object:
             continue
@@ -73,13 +117,39 @@ def odd_cell(raw: Raw, decimal: str) -> tuple[str, int, str] | None:
         kinds = {"numbers": as_numbers(cells, decimal)[1], "times": np.array(stamps)}
         for kind, wrong in kinds.items():
             if 0.0 < wrong.mean() < ODD:
-                return name, int(np.argmax(wrong)), kind
-    return None
+                row = int(np.argmax(wrong))
+                what = f"'{cells[row]}' stands in the column '{name}', whose other cells are {kind}"
+                return (
+                    what,
+                    "is this line a remark, or a second header? Then take it out",
+                    name,
+                    row,
+                )
+    for name, cells in raw.items():
+        if not says_time(name):
+            continue
+        read = values.get(name, times.seconds(cells) if cells.dtype == object else None)
+        if read is None:
+            return f"'{name}' holds '{cells[0]}', which is no time that is known", STEPS, "", -1
+        steps = np.diff(read[np.isfinite(read)])
+        if np.mean(steps < 0) > 0.5:
+            what = f"'{name}' falls from row to row: its last row stands first"
+            return what, "turn the order of the rows around", "", -1
+        still = f"'{name}' stays the same in {np.mean(steps == 0):.0%} of the steps between rows"
+        why = "it has too few digits, is coarser than the rows, or these are of many channels"
+        return f"{still}: {why}", STEPS, "", -1
+    return f"no column rises from row to row like a time; it holds {held(raw)}", STEPS, "", -1
+
+
+STEPS = (
+    "write the time with more digits; or, where rows are equally far apart, add a column that "
+    "counts them, and map it with their distance as its unit: `unit: 2 ms`"
+)
 
 
 def switches(raw: Raw) -> set[str]:
-    """The columns that say `on` and `off`, or `true` and `false`."""
-    said = {"on", "off", "true", "false"}
+    """The columns that say `on` and `off`, `true` and `false` or the like."""
+    said = {*ON.split(), *OFF.split()}
     found = {name for name, cells in raw.items() if cells.dtype == bool}
     texts = [(name, cells) for name, cells in raw.items() if cells.dtype == object]
     return found | {n for n, cells in texts if {str(c).strip().lower() for c in cells} <= said}
@@ -157,7 +227,7 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
         return None
     score, reason = called
     unit = stated or matching.time_unit(rows[np.isfinite(rows)])
-    exact = raw[name] if raw[name].dtype.kind in "iu" else rows
+    exact = times.joined(raw[name] if raw[name].dtype.kind in "iu" else rows)[0]
     seconds = exact - exact[np.argmax(np.isfinite(rows))]
     seconds = convert(np.asarray(seconds, dtype=float), unit, "s")
     began = convert(float(rows[np.isfinite(rows)][0]), unit, "s")
@@ -167,11 +237,21 @@ def _single(name: str, raw: Raw, values: Mapping[str, Array], names: Names) -> C
         reason += f"; no unit is told: taken as {unit}, by the step between rows"
         step = float(np.median(np.diff(np.unique(seconds[np.isfinite(seconds)]))))
         first, last = SURE if unit == "s" else SURE_OF_TICKS
+        if _is_sexagesimal(rows[np.isfinite(rows)]):
+            question = f"does '{name}' write a clock as hhmmss? Then write it as hh:mm:ss"
         stamped = 6e8 < began < 4.1e9  # since 1970: between 1990 and 2100
-        if not (first <= step <= last or stamped):
+        if not (first <= step <= last or stamped or unit == "day"):
             apart = f"are the rows {1e3 * step:.3g} ms apart?"
             question = f"{apart} '{name}' has no unit: taken as {unit}"
     return Clock(score, source, (name,), seconds, abs(began) > STAMPED, reason, question)
+
+
+def _is_sexagesimal(rows: Array) -> bool:
+    """Whether a time (n,) of numbers leaps from 59 to 100, as one that is written hhmmss."""
+    steps, seconds, minutes = np.diff(rows), rows % 100, rows // 100 % 100
+    leaps = steps[steps > 1.0]
+    full = bool(rows.max() < 24e4 and seconds.max() < 60 and minutes.max() < 60)
+    return full and len(leaps) > 0 and bool(np.all((leaps % 4000 > 39) & (leaps % 4000 < 42)))
 
 
 def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[float, str] | None:

@@ -14,7 +14,14 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap, shipped_maps
 from kemba.logs.draft import matching
-from kemba.logs.draft.clock import joint_state_labels, numbers, odd_cell, stamp_of, switches
+from kemba.logs.draft.clock import (
+    joint_state_labels,
+    no_readings,
+    no_time,
+    numbers,
+    stamp_of,
+    switches,
+)
 from kemba.logs.draft.matching import (
     Assigned,
     Target,
@@ -26,16 +33,18 @@ from kemba.logs.draft.matching import (
 )
 from kemba.logs.draft.sizes import guessed_units
 from kemba.logs.draft.words import (
-    SPELT,
     WORDS,
     Names,
+    is_unit,
     quaternions,
+    spelt,
     strange_unit,
     upright,
     words,
 )
-from kemba.logs.foreign import TEXTS, held, raw_columns, wraps
-from kemba.logs.text import cells_of, first_row, joined, lines_of
+from kemba.logs.foreign import TEXTS, is_recorded, no_log, raw_columns, wraps
+from kemba.logs.formats import check_read
+from kemba.logs.text import COMMENT, cells_of, joined, line_of, lines_of
 from kemba.trajectory import TIME, Array
 
 LINES = 300  # as many are looked at; a table that changes later is told when it is read
@@ -43,8 +52,8 @@ NEARLY = 0.8  # share of the most numbers that a way to read a table must give
 SEPARATORS = (";", "tab", ",", "|", "whitespace")
 WAYS = [(mark, sign) for mark in SEPARATORS for sign in (".", ",") if mark != sign]
 NUMBER = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"),
-    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?"),
+    ".": re.compile(r"[+\u2212-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
+    ",": re.compile(r"[+\u2212-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
 PISTONS = frozenset(WORDS["part"]["piston"].split()) - {"knee"}
 Layout = dict[str, Any]
@@ -69,9 +78,8 @@ def layout_of(path: Path) -> Layout:
             way[0][0],
         ),
     )
-    if not score or width < 2:
-        expected = "rows of at least two numbers were expected"
-        raise KembaError(str(path), "is no table that kemba recognises", expected)
+    if not score or width < 2 or _named_cells(lines):
+        raise KembaError(str(path), *_no_table(lines))
     header, rows = _header(lines[:begin], separator, width)
     below = sum(bool(line.strip()) for line in lines[header + rows : begin]) if rows else 0
     keys: Layout = {"separator": separator, "decimal": decimal, "skip_below": below}
@@ -79,13 +87,39 @@ def layout_of(path: Path) -> Layout:
     return {key: value for key, value in keys.items() if value != USUAL[key]}
 
 
+def _no_table(lines: Sequence[str]) -> tuple[str, str, str]:
+    """What a text is that is no table, what was expected, and the way out."""
+    expected = "rows of at least two numbers were expected"
+    last = _last(lines)
+    if len(re.findall(r'"[+-]?\d+,\d+"', last)) > 1:
+        what = "has commas both between its cells and in its numbers"
+        return what, expected, "write it with `;` between the cells, or with decimal points"
+    if _named_cells(lines):
+        what = "names each number in each row"
+        return what, expected, "write the names once, in a header, and only numbers below it"
+    return "is no table that kemba recognises", expected, ""
+
+
+def _named_cells(lines: Sequence[str]) -> bool:
+    """Whether each row says what its numbers are: `x: 0.1, y: 2`."""
+    return len(re.findall(r"(?:^|[\s,;])[^\W\d]\w* *[:=] *[+-]?[\d.]", _last(lines))) > 1
+
+
+def _last(lines: Sequence[str]) -> str:
+    return next((line for line in reversed(lines) if line.strip()), "")
+
+
 def units_below(path: Path, layout: Layout) -> list[str]:
     """The cells of the row below the header, if it is no data: often the columns' units."""
     if not layout.get("skip_below"):
         return []
     below = _lines(path)[layout.get("skip_rows", 0) + int(layout.get("header", 1)) :]
-    first = next((line for line in below if line.strip()), "")
-    return [cell.strip("[]() ") for cell in cells_of(first, layout.get("separator", ","))]
+    lines = [line for line in below if line.strip()][: layout["skip_below"]]
+    rows = [
+        [cell.strip("[]() ") for cell in cells_of(line, layout.get("separator", ","))]
+        for line in lines
+    ]
+    return max(rows, key=lambda row: sum(is_unit(spelt(cell)) for cell in row), default=[])
 
 
 def _lines(path: Path) -> list[str]:
@@ -100,6 +134,9 @@ def _numbers(lines: list[str], separator: str, decimal: str) -> tuple[int, int, 
             cells = cells_of(line, separator)
             rows.append((number, len(cells), _count(cells, decimal)))
     numeric = [(number, width, count) for number, width, count in rows if count >= 2]
+    if not numeric:  # of a long table: a date, the name of a channel and its reading
+        long = [row for row in rows if row[1] >= 3 and row[2] == 1]
+        numeric = long if len(long) > 0.5 * len(rows) else []
     if not numeric:
         return 0, 0, 0
     width = Counter(width for _, width, _ in numeric).most_common(1)[0][0]
@@ -126,7 +163,8 @@ def _header(above: list[str], separator: str, width: int) -> tuple[int, int]:
     if not wide:
         return 0, 0
     best = max(wide, key=lambda i: (_different(rows[i]), -i))
-    for first in reversed([i for i in wide if i < best]):
+    marked = {i for i in wide if above[i].lstrip().startswith(COMMENT)}
+    for first in reversed([i for i in wide if i < best and i not in marked]):
         together = joined([rows[i] for i in wide if first <= i <= best])
         if _different(together) > _different(rows[best]) and best - first < len(wide):
             return first, best - first + 1
@@ -180,24 +218,25 @@ def draft_map(
 
     Raises KembaError where the file is no table or has no time.
     """
-    layout = layout_of(path) if path.suffix.lower() in TEXTS and not path.is_dir() else {}
+    text = path.suffix.lower() in TEXTS and not path.is_dir()
+    check_read(path)
+    if (text and not path.is_file()) or (path.is_dir() and not is_recorded(path)):
+        raise no_log(path)
+    layout = layout_of(path) if text else {}
     trial = ColumnMap.model_construct(**layout)
     raw = raw_columns(path, trial)
+    if gone := no_readings(raw.columns, trial.decimal):
+        layout["missing"] = gone
     labels = {} if trial.header else joint_state_labels(raw.columns)
     below = zip(raw.columns, units_below(path, layout), strict=False)
     stated = {**_spelt(below), **_spelt(raw.units.items())}
     names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns), raw.angles)
-    values = numbers(raw.columns, trial.decimal)
+    values = numbers(raw.columns, trial.decimal, gone)
     stamp = stamp_of(raw.columns, values, names)
     if stamp is None:
-        if odd := odd_cell(raw.columns, trial.decimal):
-            text = path.suffix.lower() in TEXTS
-            where = f"{path}:{odd[1] + first_row(path, trial)}" if text else str(path)
-            what = f"'{raw.columns[odd[0]][odd[1]]}' stands in the column '{odd[0]}', whose other"
-            hint = "is this line a remark, or a second header? Then take it out"
-            raise KembaError(where, f"{what} cells are {odd[2]}", hint=hint)
-        what = f"no column rises from row to row like a time; it holds {held(raw.columns)}"
-        raise KembaError(str(path), what, "a time was expected")
+        what, hint, name, row = no_time(raw.columns, values, trial.decimal)
+        where = f"{path}:{line_of(path, trial, row)}" if text and name else str(path)
+        raise KembaError(where, what, "a time that rises was expected" * (not name), hint)
     rest = {n: v for n, v in values.items() if n not in {*stamp.names, *raw.clocks.values()}}
     rest, names, turned = quaternions(rest, names)
     names, said = upright(rest, names)
@@ -205,8 +244,9 @@ def draft_map(
     found = assigned(names, rest, targets)
     columns, asked = _sources(found, targets, names, rest, stroke, turned)
     said += _share_gauge(columns, found.pairs)
+    said += _no_gauge(columns, found.pairs, names)
     number = {name: i for i, name in enumerate(raw.columns, start=1)}
-    columns = {TIME: _by_number(stamp.source, number), **columns}
+    columns = {TIME: stamp.source, **columns}
     columns = {header: _by_number(source, number) for header, source in columns.items()}
     read = {*found.pairs.values(), *stamp.names, *(c for four in turned.values() for c in four)}
     missing = tuple(
@@ -215,10 +255,17 @@ def draft_map(
     ties = [
         f"{header} may be {' or '.join(map(repr, names_))}" for header, names_ in found.ties.items()
     ]
+    odd = [n for n in raw.columns if missing and n not in values and n not in stamp.names]
+    told = {
+        n: next((str(c) for c in raw.columns[n] if any(map(str.isdigit, str(c)))), "") for n in odd
+    }
+    said += [f"'{n}' holds no numbers, but '{text}'" for n, text in told.items() if text]
     unwrapped = [
         f"{h} begins anew after each turn: joined" for h, s in columns.items() if "unwrap" in s
     ]
     maps = shipped_maps(raw.columns)
+    if gone:
+        unwrapped.append(f"no reading where these stand: {', '.join(map(str, gone))}")
     fitting = [f"the shipped map '{name}' fits these columns: --map {name}" for name in maps]
     return Draft(
         kind,
@@ -233,7 +280,7 @@ def draft_map(
 
 def _spelt(units: Iterable[tuple[str, str]]) -> dict[str, str]:
     """The units of columns as pint spells them."""
-    return {name: SPELT.get(text, text) for name, text in units if text}
+    return {name: spelt(text) for name, text in units if text}
 
 
 def _kind(
@@ -277,7 +324,7 @@ def _sources(
         if name in turned:
             columns[target.header] = {"source": list(turned[name])}
         else:
-            columns[target.header] = _source(target, name, unit, values[name])
+            columns[target.header] = _source(target, name, unit, values[name], names.from_air(name))
         asked += _asked(target, name, names)
     _share_level(columns, found.pairs, values)
     return columns, asked
@@ -324,7 +371,28 @@ def _share_gauge(columns: dict[str, dict[str, Any]], pairs: Mapping[str, str]) -
     return [f"Pressures: {listed}: from the atmosphere, as '{pairs[gauge[0]]}', which falls to it"]
 
 
-def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[str, Any]:
+def _no_gauge(
+    columns: dict[str, dict[str, Any]], pairs: Mapping[str, str], names: Names
+) -> list[str]:
+    """What is said of pressures of which neither name nor size tells where they count from."""
+    open_ = [
+        f"'{pairs[header]}'"
+        for header, source in columns.items()
+        if header.endswith("[Pa]")
+        and "offset" not in source
+        and names.from_air(pairs[header]) is None
+    ]
+    if not open_:
+        return []
+    return [
+        f"Pressures: {', '.join(open_)}: taken as absolute; where they count from that of the air, "
+        f"add `offset: {matching.ATMOSPHERE}`"
+    ]
+
+
+def _source(
+    target: Target, name: str, unit: str | None, values: Array, air: bool | None
+) -> dict[str, Any]:
     source: dict[str, Any] = {"source": name}
     if target.is_valve:
         level = matching.valve_level(values)
@@ -333,13 +401,14 @@ def _source(target: Target, name: str, unit: str | None, values: Array) -> dict[
         source["unit"] = unit
     if target.unit == "rad" and wraps(matching.in_ours(values, unit, "rad")):
         source["unwrap"] = True
-    return source | (matching.gauge(values, unit) if target.unit == "Pa" else {})
+    return source | (matching.gauge(values, unit, air) if target.unit == "Pa" else {})
 
 
 def _by_number(source: dict[str, Any], number: Mapping[str, int]) -> dict[str, Any]:
     """A column that has no name of its own is given by its number."""
     name = source["source"]
-    if isinstance(name, str) and (name.isdigit() or re.search(r"#\d+$", name)):
+    twice = any(re.fullmatch(rf"{re.escape(str(name))}#\d+", other) for other in number)
+    if isinstance(name, str) and (name.isdigit() or twice or re.search(r"#\d+$", name)):
         return {**source, "source": number.get(name, name)}
     return source
 

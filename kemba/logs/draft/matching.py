@@ -123,15 +123,23 @@ def _supply() -> Target:
 
 # Unit of a time, and the largest step in it that is usual: 50 Hz to 10 kHz.
 STEP = (("s", 0.05), ("ms", 50.0), ("us", 5e4), ("ns", 5e7))
+DAYS = ((29_221, 73_051), (723_181, 767_011), (2_444_239, 2_488_070))  # of 1980 to 2100
 ABSOLUTE = 0.8e5  # Pa; a pressure that falls below it is counted from the atmosphere
 ATMOSPHERE = "1.01325 bar"
 
 
 def time_unit(values: Array) -> str:
-    """The unit of a time column (n,) by the step between its rows."""
+    """The unit of a time column (n,) by the step between its rows; days by their number too."""
     steps = np.diff(values)
     step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    if is_dated(values):
+        return "day"
     return next((unit for unit, largest in STEP if step <= largest), "ns")
+
+
+def is_dated(values: Array) -> bool:
+    """Whether a time (n,) counts days: of spreadsheets, MATLAB or astronomers, 1980 to 2100."""
+    return any(a < values[0] < b for a, b in DAYS) and 0.0 < values[-1] - values[0] < 1.0
 
 
 def in_ours(values: Array, unit: str | None, ours: str) -> Array:
@@ -139,8 +147,11 @@ def in_ours(values: Array, unit: str | None, ours: str) -> Array:
     return convert(values, unit or ours, ours)
 
 
-def gauge(values: Array, unit: str | None) -> dict[str, Any]:
-    """The offset of a pressure (n,) that is zero at the atmosphere."""
+def gauge(values: Array, unit: str | None, air: bool | None = None) -> dict[str, Any]:
+    """The offset of a pressure (n,) that is zero at the atmosphere: as its name says (`air`), or
+    where it falls below that."""
+    if air is not None:
+        return {"offset": ATMOSPHERE} if air else {}
     low = float(np.nanmin(in_ours(values, unit, "Pa"), initial=np.inf))
     return {"offset": ATMOSPHERE} if low < ABSOLUTE else {}
 

@@ -34,7 +34,7 @@ UNITS = {
     "K": ("K", "degC", "degF"),
 }
 ANY = (1.0, 0.0, np.inf)  # SI, whatever its size
-STROKES = (0.03, 4.0)  # shares of a known stroke between which the largest reading may lie
+STROKES = (0.03, 1.25)  # shares of a known stroke between which the largest reading may lie
 Size = tuple[float, float, float]
 
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -11,25 +11,33 @@ from kemba.logs.foreign import pitch
 from kemba.trajectory import Array
 from kemba.units import parse_unit
 
-# Of one group a column has one meaning. English, the usual short forms, and a little German.
+# Of one group a column has one meaning. English, the usual short forms, and some of the words of
+# other languages in which laboratories name columns.
 WORDS: dict[str, dict[str, str]] = {
     "part": {
-        "hip": "hip hips motor qdd huefte hüfte qm tm",
-        "piston": "piston cylinder cyl knee rod actuator kolben zylinder zyl xp fp",
-        "body": "body base torso trunk com boom imu pelvis rumpf floating",
-        "foot": "foot feet toe grf ground fuss fuß",
-        "valve": "valve valves vlv sol solenoid ventil u ue ur",
+        "hip": "hip hips motor qdd huefte hüfte hüft hueft hüftgelenk qm tm hanche cadera anca "
+        "股関節 髋 髋关节",
+        "piston": "piston cylinder cyl knee rod actuator kolben zylinder zyl xp fp vérin verin "
+        "cilindro シリンダ シリンダー 气缸",
+        "body": "body base torso trunk com boom imu pelvis rumpf floating corps cuerpo corpo tronc "
+        "胴体 机身",
+        "foot": "foot feet toe grf ground fuss fuß pied pie piede 足",
+        "valve": "valve valves vlv sol solenoid ventil magnetventil u ue ur vanne électrovanne "
+        "electrovanne valvula válvula valvola 電磁弁 バルブ 阀 电磁阀",
         "supply": "supply tank reservoir feed regulator line",
         "axis": "axis drive slide carriage shaft",
     },
     "kind": {
         "position": "q x pos position ang angle theta enc encoder stroke travel displacement "
-        "winkel weg laser lvdt pot potentiometer qm xp height",
-        "torque": "tau torque trq tq effort moment drehmoment tm",
-        "force": "f force load loadcell cell kraft transducer grf fp fx fy fz",
-        "pressure": "p pressure press druck",
+        "winkel weg laser lvdt pot potentiometer qm xp height course angulo ángulo angolo posicion "
+        "posición posizione 位置 角度 位移",
+        "torque": "tau torque trq tq effort moment drehmoment tm couple par coppia momento トルク "
+        "力矩",
+        "force": "f force load loadcell cell kraft transducer grf fp fx fy fz fuerza forza 力",
+        "pressure": "p pressure press druck relativdruck absolutdruck pression presion presión "
+        "pressione 圧力 压力",
         "speed": "v vel velocity speed rate dx dy dz dq qd dot xdot ydot zdot vx vy vz xd yd zd "
-        "omega gyro wm geschwindigkeit twist",
+        "omega gyro wm geschwindigkeit twist vitesse velocidad velocità velocita 速度",
         "acceleration": "a acc accel acceleration ax ay az ddx ddy ddz ddq ddot beschleunigung",
         "temperature": "temperature temp temperatur",
         "other": "current currents amp amps volt volts voltage power energy "
@@ -37,16 +45,20 @@ WORDS: dict[str, dict[str, str]] = {
         "covariance variance std sigma",
     },
     "direction": {
-        "x": "x horizontal forward vorschub vx ax fx dx ddx xdot xd tx",
-        "z": "z height vertical hoehe höhe altitude vz az fz dz ddz zdot zd tz",
+        "x": "x horizontal horizontale forward vorschub vx ax fx dx ddx xdot xd tx",
+        "z": "z height vertical hoehe höhe altitude hauteur altura altezza "
+        "高さ 高度 vz az fz dz ddz zdot zd tz",
         "y": "y vy ay fy dy ddy ydot yd ty",
-        "pitch": "pitch tilt theta nick nickwinkel neigung r",
+        "pitch": "pitch tilt theta nick nickwinkel neigung r tangage cabeceo beccheggio "
+        "ピッチ 俯仰",
         "roll": "roll phi wank rollwinkel",
         "yaw": "yaw psi heading gier gierwinkel",
     },
     "side": {
-        "extend": "extend ext extension ausfahren aus push out cap head ue 1 a",
-        "retract": "retract ret retraction einfahren ein pull in rod ur 2 b",
+        "extend": "extend ext extension ausfahren aus push out cap head ue 1 a sortie extender "
+        "estensione 伸 伸出",
+        "retract": "retract ret retraction einfahren ein pull in rod ur 2 b rentrée rentree "
+        "retraer rientro 縮 缩回",
     },
     "role": {
         "desired": "des desired ref reference target setpoint sp goal soll planned plan cmd "
@@ -56,11 +68,11 @@ WORDS: dict[str, dict[str, str]] = {
 }
 TIMES = (
     "t time timestamp stamp clock epoch elapsed zeit zeitstempel uhrzeit datum date datetime sec "
-    "secs tout millis micros uptime"
+    "secs tout millis micros uptime temps tiempo tempo datenum 時刻 時間 时间"
 )
 FILLERS = frozenset(
     "robot header state states joint joints data value values m s log sensors topic float double "
-    "int bool".split()
+    "int bool du de la le des della del di".split()
 )
 # what a quantity was read by: it tells columns of one quantity apart, and makes none the better one
 SENSORS = frozenset(
@@ -68,10 +80,10 @@ SENSORS = frozenset(
     "lvdt pot potentiometer".split()
 )
 LEG_WORDS = {
-    "front": "front f fore fr vorn vorne vo",
-    "rear": "rear back hind b r h hinten hi",
-    "left": "left l links",
-    "right": "right r rechts",
+    "front": "front f fore fr vorn vorne vo avant delantera anteriore ant 前",
+    "rear": "rear back hind b r h hinten hi arrière arriere trasera posteriore post 後 后",
+    "left": "left l links gauche 左",
+    "right": "right r rechts droite 右",
 }
 ANGLES = frozenset("angle ang theta winkel".split())
 ORDER = ("acceleration", "speed")  # a rate of a position is no position
@@ -79,8 +91,19 @@ SPELT = {
     "degrees": "deg", "degree": "deg", "Grad": "deg", "grad": "deg", "°": "deg", "radians": "rad",
     "dps": "deg/s", "mps": "m/s", "meters": "m", "metres": "m", "seconds": "s", "newton": "N",
     "C": "degC", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2",
-    "Nmm": "N.mm",
+    "Nmm": "N.mm", "kgfm": "kgf.m", "kgf-m": "kgf.m", "lbft": "lbf.ft", "cNm": "cN.m",
+    **dict.fromkeys("millimeter millimetre millimeters millimetres".split(), "mm"),
+    **dict.fromkeys("centimeter centimetre centimeters centimetres".split(), "cm"),
+    **dict.fromkeys(("newtonmeter", "newtonmetre", "newton meters", "newton metres"), "N.m"),
 }  # fmt: skip
+# a pressure that counts from that of the air, or from none: `barg`, `psi (abs)`, `MPaG`, `bar_ü`
+PRESSURE = re.compile(
+    r"(?<![A-Za-z])([mk]?bar|psi|[kMh]?Pa)"
+    r"(?:\(?([gGaA])\)?|[ _]*\(?(gauge|rel|abs|ü|Ü)\)?)?(?!\w)"
+)
+AIR = {True: frozenset("gauge g rel relative relativ relativdruck ü überdruck".split()),
+       False: frozenset("abs absolute absolut absolutdruck a".split())}  # fmt: skip
+CAPITALS = {u.upper(): u for u in "mm cm um ms deg rad bar psi kPa MPa".split()} | {"NM": "N.m"}
 UNITS = (
     "ns us µs ms s min um mm cm m in ft deg rad mrad rev turns gon bar mbar kPa MPa Pa psi kN N "
     "kgf lbf Nm N.m mN.m mNm mV V K degC"
@@ -92,7 +115,8 @@ COUNTED = frozenset("counts cnt ticks pulses adc lsb".split())  # what a convert
 UNIT_MARK = re.compile(r"['\"′″‰]+|[\d\s.]*[/^]\s*-?\d+")
 LEGS_IN_BRACKETS = frozenset("L R F B H A".split())  # `(L)` is the left one, not litres
 BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
-WORD = re.compile(r"[A-Z]?[a-zµ°äöüß]+|[A-Z]+(?![a-z])|\d+")
+WORD = re.compile(r"[A-Z]?(?:[^\W\d_A-Z]|°)+|[A-Z]+(?![a-z])|\d+")
+AXES = frozenset("xyz")
 Meaning = dict[str, set[str]]
 
 
@@ -113,6 +137,15 @@ class Names:
         """The unit that a column's name tells, else the one that the file states."""
         stated = self.below.get(name, "")
         return named_unit(self.labels.get(name, name))[1] or (stated if is_unit(stated) else None)
+
+    def from_air(self, name: str) -> bool | None:
+        """Whether a pressure counts from that of the air; None where nothing tells."""
+        text = f"{self.labels.get(name, name)} {self.below.get(name, '')}"
+        said = {word for word in words(text) if len(word) > 1}
+        for match in PRESSURE.finditer(text):
+            said.add((match[2] or match[3] or "").lower())
+        found = [counts for counts, known in AIR.items() if said & known]
+        return found[0] if len(found) == 1 else None
 
     def bare(self, name: str) -> str:
         """A column's name, or what it is called where it has none, without the unit."""
@@ -147,9 +180,42 @@ class Names:
         return bool(along_z & {"position", *along_y})
 
 
+def spelt(text: str) -> str:
+    """A unit as pint spells it: `barg` and `bar (abs)` are bar, `MM` is mm."""
+    text = text.strip()
+    if match := PRESSURE.fullmatch(text):
+        text = match[1]
+    return SPELT.get(text, CAPITALS.get(text, SPELT.get(text.lower(), text)))
+
+
 def words(name: str) -> list[str]:
-    """The words of a name, in small letters."""
-    return [word.lower() for word in WORD.findall(name)]
+    """The words of a name, in small letters; one that is joined of known ones is these:
+    `hiptorque`, `Kolbenweg`, and names of languages without blanks."""
+    return [part for word in WORD.findall(name) for part in _parted(word.lower())]
+
+
+@cache
+def _parted(word: str) -> tuple[str, ...]:
+    """The known words that a word is joined of; itself where it is known, or is of others."""
+    known = _vocabulary()
+    if word in known or len(word) < 2:
+        return (word,)
+    found: dict[int, tuple[str, ...]] = {0: ()}
+    for end in range(1, len(word) + 1):
+        for begin in range(end):
+            part = word[begin:end]
+            joins = len(part) > 2 or not part.isascii() or (end == len(word) and part in AXES)
+            if begin in found and joins and part in known:
+                longer = (*found[begin], part)
+                if end not in found or len(longer) < len(found[end]):
+                    found[end] = longer
+    return found.get(len(word), (word,))
+
+
+@cache
+def _vocabulary() -> frozenset[str]:
+    groups = [*(known for group in WORDS.values() for known in group.values()), *LEG_WORDS.values()]
+    return frozenset(" ".join([*groups, TIMES]).split()) | FILLERS
 
 
 def named_unit(name: str) -> tuple[str, str | None]:
@@ -158,15 +224,19 @@ def named_unit(name: str) -> tuple[str, str | None]:
     for match in reversed(list(BRACKETS.finditer(name))):
         square = match[1] is not None
         text = (match[1] if square else match[2]).strip()
-        unit = SPELT.get(text, text)
+        unit = spelt(text)
         spaced = match[0][:1] == " "
         if is_unit(unit, indexed=not spaced) and (square or unit not in LEGS_IN_BRACKETS):
             return (name[: match.start()] + name[match.end() :]).strip(), unit
     pieces = name.split("_")
     for width in (2, 1):
         tail = "_".join(pieces[-width:])
-        if len(pieces) > width and pieces[0] and (tail in SPELT or (width == 1 and tail in UNITS)):
-            return "_".join(pieces[:-width]), SPELT.get(tail, tail)
+        if (
+            len(pieces) > width
+            and pieces[0]
+            and (spelt(tail) != tail or (width == 1 and tail in UNITS))
+        ):
+            return "_".join(pieces[:-width]), spelt(tail)
     inside = [piece for piece in pieces[1:] if piece in INSIDE]
     if len(inside) == 1:
         return "_".join(piece for piece in pieces if piece != inside[0]), inside[0]

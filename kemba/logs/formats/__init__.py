@@ -12,6 +12,7 @@ from typing import Any
 
 from kemba.errors import KembaError
 from kemba.logs.recording import Recording
+from kemba.logs.text import encoding
 from kemba.trajectory import Trajectory
 
 Read = Callable[[Path], Recording]
@@ -22,20 +23,24 @@ MODULES = {"parquet": "parquet", "mcap": "mcap", "mat": "arrays", "npz": "arrays
 READERS = {
     **MODULES, "db3": "rosbag2", "mf4": "measured", "mdf": "measured", "tdms": "measured",
     "ulg": "measured", "jsonl": "arrays", "lvm": "lines", "sto": "lines", "mot": "lines",
+    "h5": "arrays", "hdf5": "arrays", "hdf": "arrays",
 }  # fmt: skip
 UNREAD = {  # endings of files that are not read: what they are, and the way out
     "bag": ("a bag of ROS 1", "rosbags-convert --src FILE --dst FOLDER makes one of ROS 2 of it"),
-    "hdf5 h5 hdf nc": (
-        "an HDF5 file",
-        "write its columns as CSV, Parquet or, in MATLAB, with -v7.3",
-    ),
+    "nc": ("a NetCDF file", "write its columns as CSV or Parquet"),
     "feather arrow": ("an Arrow file", "write its table as Parquet"),
     "xlsx xls xlsm ods": ("a workbook", "save its sheet as CSV"),
     "blf": ("a log of CAN frames", "decode it with its DBC file into MDF, as asammdf does"),
     "pkl pickle": ("a file of Python objects, which run code when read", "write it as Parquet"),
     "zip gz bz2 zst 7z tar": ("packed", "unpack it"),
 }
-SAME = {"mdf": "mf4", "mot": "sto", "jsonl": "json"}  # other endings of formats
+SAME = {
+    "mdf": "mf4",
+    "mot": "sto",
+    "jsonl": "json",
+    "hdf5": "h5",
+    "hdf": "h5",
+}  # other endings of formats
 FOLDER = "db3"  # the ending whose reader takes the folder of a rosbag2
 
 
@@ -61,8 +66,8 @@ def check_read(path: Path) -> None:
         if ending in endings.split():
             raise KembaError(str(path), f"is {what}, which kemba does not read", hint=way_out)
     with suppress(OSError), path.open("rb") as stream:
-        start = stream.read(1024)
-        if ending not in READERS and b"\0" in start and start[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        text = b"\0" not in stream.read(1024) or encoding(path).startswith(("utf-16", "utf-32"))
+        if ending not in READERS and not text:
             expected = f"a table of text was expected, or one of .{', .'.join(READERS)}"
             raise KembaError(str(path), "is no text, and of no format that is known", expected)
 

@@ -1,4 +1,4 @@
-"""Logs as named arrays: NumPy .npz, JSON, and MATLAB files with structs and Simulink objects."""
+"""Logs as named arrays: NumPy .npz, JSON, HDF5, MATLAB files with structs and Simulink objects."""
 
 import json
 import re
@@ -18,7 +18,7 @@ from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.files import write_json as write_json_file
 from kemba.logs.formats import check_size, missing
-from kemba.logs.recording import Column, Group, Raw, Recording, by_length, recording
+from kemba.logs.recording import Column, Group, Raw, Recording, by_length, is_clock, recording
 from kemba.logs.times import seconds
 from kemba.trajectory import TIME, Trajectory
 
@@ -83,6 +83,7 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
     else by number. Raises KembaError where there are none, with what the file holds."""
     arrays = {name: np.squeeze(np.asarray(value)) for name, value in content.items()}
     found: Raw = {}
+    lengths = {len(a) for a in arrays.values() if a.ndim == 1 and a.dtype.kind in "fiub"}
     for name, array in arrays.items():
         if array.dtype.names:
             arrays_of = {f"{name}/{key}": array[key] for key in array.dtype.names}
@@ -90,7 +91,11 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
                 key: a for key, a in arrays_of.items() if a.ndim == 1 and a.dtype.kind in "fiub"
             }
         elif array.dtype.kind not in "fiub":
-            if array.ndim == 1 and len(array) > 2 and seconds(array) is not None:
+            if (
+                array.ndim == 1
+                and len(array) > 2
+                and (seconds(array) is not None or len(array) in lengths)
+            ):
                 found[name] = array.astype(object)
         elif array.ndim == 1:
             found[name] = array
@@ -207,7 +212,10 @@ def metadata(text: Any) -> dict[str, Any]:
 
 
 LONGEST = 120.0  # s that reading one file may take
-EXPECTED = "a MATLAB file was expected: save(..., '-v7')"
+EXPECTED = {  # by ending
+    ".mat": "a MATLAB file was expected: save(..., '-v7')",
+    ".h5": "a file of HDF5 was expected, with an array for each column",
+}
 WAY_OUT = "in MATLAB: s = struct('time', ts.Time, 'q', ts.Data); save('log.mat', '-struct', 's')"
 
 
@@ -262,6 +270,38 @@ def read_mat(path: Path) -> Recording:
     return recording(found, said)
 
 
+def read_h5(path: Path) -> Recording:
+    """HDF5 of any program: of each group its vectors and matrices that are as long as its vector
+    called a time; without any such, all as in `vectors`. Raises KembaError where there is none."""
+    index, arrays = _sorted_out(path)
+    loose = {name: np.squeeze(arrays[f"a{at}"]) for name, at in index["loose"]}
+    clocks: dict[str, str] = {}
+    for name, array in loose.items():
+        parent, _, last = name.rpartition("/")
+        if is_clock(last, array):
+            clocks.setdefault(parent, name)
+    if not clocks:
+        found = vectors(loose, path)
+        return replace(found, units={n: u for n, u in index["units"].items() if n in found.columns})
+    groups: dict[str, Group] = {}
+    for parent, clock in clocks.items():
+        unit = index["units"].get(clock, "")
+        groups[parent] = Group(parent, loose.pop(clock), unit, {})
+    left = []
+    for name, array in loose.items():
+        parent, _, last = name.rpartition("/")
+        group = groups.get(parent)
+        rows = len(group.time) if group else 0
+        parts = _parts(last, array, rows) if rows in array.shape and array.dtype.kind != "U" else {}
+        if group is not None and parts:
+            group.columns.update(parts)
+            group.units.update(dict.fromkeys(parts, index["units"].get(name, "")))
+        elif array.ndim and array.dtype.kind != "U":
+            left.append(name)
+    said = [f"left out, since they have no times: {', '.join(left[:6])}"] if left else []
+    return recording([group for group in groups.values() if group.columns], said)
+
+
 def _parts(name: str, values: Column, rows: int) -> Raw:
     """The columns of a signal (n,), (n, k) or (k, n)."""
     if values.ndim == 1:
@@ -278,31 +318,36 @@ def _sorted_out(path: Path) -> tuple[dict[str, Any], dict[str, Column]]:
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
     with tempfile.TemporaryDirectory(prefix="kemba-") as folder:
-        return _by_child(path, Path(folder) / "arrays.npz")
+        return _by_child(path, Path(folder) / "arrays")
 
 
 def _by_child(path: Path, written: Path) -> tuple[dict[str, Any], dict[str, Column]]:
     script = Path(__file__).with_name("mat_child.py")
     child = [sys.executable, str(script), str(path.resolve()), str(written)]
+    matlab = path.suffix.lower() == ".mat"
+    expected = EXPECTED[".mat" if matlab else ".h5"]
     try:
         done = subprocess.run(
             child, stdin=subprocess.DEVNULL, capture_output=True, timeout=LONGEST, check=False
         )
     except subprocess.TimeoutExpired:
-        what = f"cannot be read within {LONGEST:g} s as a MATLAB file"
-        raise KembaError(str(path), what, EXPECTED) from None
+        what = f"cannot be read within {LONGEST:g} s"
+        raise KembaError(str(path), what, expected) from None
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
+        if said == "PACKAGE" and not matlab:
+            raise missing(path, ImportError(name="h5py"))
         if said == "PACKAGE":
             if sys.version_info < (3, 11):
                 what = "holds objects of MATLAB, which mat-io reads with Python 3.11 or newer"
                 raise KembaError(str(path), what, hint="save structs of numbers, as version 7")
             raise missing(path, ImportError(name="mat-io"))
         reason = said if done.returncode > 0 else "it is damaged: its reader crashes"
-        raise KembaError(str(path), f"is no MATLAB file that can be read: {reason}", EXPECTED)
-    with np.load(written, allow_pickle=False) as found:
-        arrays = {name: found[name] for name in found.files if name != "index"}
-        return json.loads(str(found["index"])), arrays
+        kind = "MATLAB" if matlab else "HDF5"
+        raise KembaError(str(path), f"is no {kind} file that can be read: {reason}", expected)
+    with written.open("rb") as stream:
+        index = json.loads(str(np.load(stream, allow_pickle=False)))
+        return index, {f"a{i}": np.load(stream, allow_pickle=False) for i in range(index["count"])}
 
 
 def _own(headers: list[str], content: dict[str, Any], path: Path) -> Raw:

@@ -1,8 +1,8 @@
-"""A process of its own that reads a MATLAB file; needs NumPy, SciPy, and for objects mat-io.
+"""A process of its own that reads a MATLAB or HDF5 file; needs NumPy, SciPy, mat-io or h5py.
 
 SciPy's reader is compiled code that trusts the file: damaged bytes may kill the process it runs in.
-Arguments: the file, and an .npz file to write: `index` (JSON: what each array is), then the
-arrays as `a0`, `a1` and so on. Exit code 1 with the reason where the file cannot be read.
+Arguments: the file, and one to write: `index` (JSON: what each array is), then the arrays, each
+as in an .npy file. Exit code 1 with the reason where the file cannot be read.
 
 What is found by walking through structs, cells and objects of any class: series, which have data
 and times (timeseries, signals of a Simulink structure with time, timetables), and loose arrays.
@@ -22,6 +22,7 @@ MEMORY = 6_000_000_000  # bytes: an unpacked log of the size that is allowed, th
 HDF5 = b"\x89HDF\r\n\x1a\n"  # of version 7.3, behind a header or at once
 SAID = 100  # letters of a warning that are passed on
 DEEPEST = 12  # structs within structs
+NAMED = ("columns", "names", "column_names", "labels")  # attributes that name columns
 CONTAINERS = ("values", "elements", "data", "storage", "signals")  # say nothing about a signal
 
 
@@ -207,6 +208,39 @@ def content(path: str) -> dict[str, Any]:
     return dict(load_from_mat(path))
 
 
+def tree(path: str, found: Found) -> dict[str, str]:
+    """Every array in a file of HDF5 that is not MATLAB's, the fields of tables and the columns
+    that an attribute names apart, by path; and their units. Raises SystemExit without h5py."""
+    try:
+        import h5py
+    except ImportError:
+        raise SystemExit("PACKAGE") from None
+    units: dict[str, str] = {}
+
+    def visit(name: str, node: Any) -> None:
+        if not isinstance(node, h5py.Dataset):
+            return
+        texts = h5py.check_string_dtype(node.dtype) is not None
+        if node.dtype.kind == "O" and not texts:
+            return
+        array = np.asarray(node.asstr("utf-8", "replace")[()] if texts else node[()])
+        array = array.astype(str) if texts else array
+        said = {key.lower(): value for key, value in node.attrs.items()}
+        labels = [str(label) for key in NAMED for label in np.ravel(said.get(key, ()))]
+        if array.dtype.names:
+            parts = {f"{name}/{field}": array[field] for field in array.dtype.names}
+        elif array.ndim == 2 and len(set(labels)) == array.shape[1]:
+            parts = {f"{name}/{label}": array[:, i] for i, label in enumerate(labels)}
+        else:
+            parts = {name: array}
+        found.loose.update({key: v for key, v in parts.items() if v.dtype.kind in "fiubU"})
+        units.update({key: str(said[u]) for key in parts for u in ("unit", "units") if u in said})
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    return units
+
+
 def limit_memory() -> None:
     """Let packed zeros end in a MemoryError of this process, where the system can."""
     with contextlib.suppress(ImportError, ValueError, OSError):
@@ -232,7 +266,11 @@ def main() -> int:
     try:
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
-            found = walked(content(sys.argv[1]))
+            if sys.argv[1].lower().endswith(".mat"):
+                found, units = walked(content(sys.argv[1])), dict[str, str]()
+            else:
+                found = Found()
+                units = tree(sys.argv[1], found)
     except SystemExit:
         print("PACKAGE", file=sys.stderr)
         return 1
@@ -244,7 +282,7 @@ def main() -> int:
     arrays: list[np.ndarray] = []
     times: list[int] = []
     index: dict[str, Any] = {"series": [], "loose": [], "classes": sorted(set(found.classes))}
-    index["warnings"] = sorted(warned)
+    index |= {"warnings": sorted(warned), "units": units}
     for name, time, values in found.series:
         at = next((i for i in times if np.array_equal(arrays[i], time)), None)
         if at is None:
@@ -256,8 +294,10 @@ def main() -> int:
     for name, array in found.loose.items():
         arrays.append(array)
         index["loose"].append([name, len(arrays) - 1])
-    numbered: dict[str, Any] = {f"a{i}": array for i, array in enumerate(arrays)}
-    np.savez(sys.argv[2], index=np.array(json.dumps(index)), **numbered)
+    index["count"] = len(arrays)
+    with open(sys.argv[2], "wb") as stream:
+        for array in (np.array(json.dumps(index)), *arrays):
+            np.save(stream, array, allow_pickle=False)
     return 0
 
 

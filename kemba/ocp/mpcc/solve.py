@@ -219,6 +219,9 @@ class MpccSolution:
     status: str
     iterations: int
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}: {self.sentence}"
+
     @property
     def good(self) -> bool:
         """Whether the point is feasible and stationary."""

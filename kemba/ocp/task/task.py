@@ -272,6 +272,11 @@ class Task(Section):
             raise ValueError("'feet' does not go with 'height': both say how high the robot jumps")
         return self
 
+    def __repr__(self) -> str:
+        what = f"{len(self.sequence)} motions in a row" if self.sequence else f"{self.duration:g} s"
+        high = f", {self.height:g} m high" if self.height is not None else ""
+        return f"Task({self.name}: {what}{high}, {self.nodes} nodes, model {self.model})"
+
     def __eq__(self, other: object) -> bool:
         """Whether two tasks ask the same, wherever their files ask it."""
         return isinstance(other, Task) and self.__dict__ == other.__dict__

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Model, Node
+from kemba.model.evaluation import Key
 from kemba.ocp.task.requirement import Requirement, quantity_expression
 
 Matrix = np.ndarray
@@ -92,20 +93,88 @@ def find_symmetry(model: Model) -> Reduction | None:
     images = image_matrices(model)
     if not _residual_is_symmetric(model, images):
         return None
-    first = model.mechanism.legs[0]
+    B = {name: _basis(matrix) for name, matrix in images.items()}
+    return Reduction(B, *_rows_of(model, model.mechanism.legs[0]), True)
+
+
+def equal_legs(model: Model) -> Reduction | None:
+    """One leg for all of them: a robot of more than two legs whose body neither moves along nor
+    turns, and whose legs do the same, or its mirror image where their knees fold to the other side.
+
+    What is left out does not vanish, so its plans are starts for the whole robot, no plans. None
+    for other robots, and where an effect acts on some legs only.
+    """
+    mechanism = model.mechanism
+    if mechanism.robot is None or len(mechanism.legs) < 3:
+        return None
+    first, places = mechanism.legs[0], mechanism.robot.legs
+    alike = {leg: place.fold == places[first].fold for leg, place in places.items()}
+    still = {"body/x", "body/pitch"}
+    images = {
+        (leg, symbol): instance.effect.mirror.get(symbol, symbol)
+        for instance in model.instances
+        for role in ("states", "inputs", "forces")
+        for leg, symbol in instance.variables(role)
+    }
+
+    def followed(keys: Sequence[Key]) -> Matrix | None:
+        """Columns (n, nh) for what belongs to no leg or to the first, which the others follow."""
+        kept = [key for key in keys if key[0] in (None, first) and key[1] not in still]
+        matrix = np.zeros((len(keys), len(kept)))
+        for i, (leg, symbol) in enumerate(keys):
+            image = symbol if leg is None or alike[leg] else images.get((leg, symbol), f"-{symbol}")
+            key = leg and first, image.lstrip("-")
+            if symbol not in still and key not in kept:
+                return None
+            if symbol not in still:
+                matrix[i, kept.index(key)] = -1.0 if image.startswith("-") else 1.0
+        return matrix
+
+    names = [c.name.partition("/") for c in mechanism.coordinates]
+    keys: dict[str, list[Key]] = {
+        "q": [(a, c) if a in mechanism.legs else (None, f"{a}/{c}") for a, _, c in names],
+        "s": list(model.states), "u": list(model.inputs), "lam": list(model.forces),
+    }  # fmt: skip
+    B = {group: matrix for group, own in keys.items() if (matrix := followed(own)) is not None}
+    return Reduction(B, *_rows_of(model, first), True) if len(B) == len(keys) else None
+
+
+def _rows_of(model: Model, first: str) -> tuple[list[int], list[int], list[int]]:
+    """Indices of the node's rows that belong to no leg but the first: rates, pairs, limits."""
+    others, node = [leg for leg in model.mechanism.legs if leg != first], model.node
 
     def kept(labels: list[str]) -> list[int]:
-        others = [leg for leg in model.mechanism.legs if leg != first]
         return [i for i, label in enumerate(labels) if not any(leg in label for leg in others)]
 
-    node = model.node
-    return Reduction(
-        {name: _basis(matrix) for name, matrix in images.items()},
+    return (
         kept([row.label for row in node.rate_rows]),
         kept([row.label for row, _ in node.pair_rows]),
         kept([row.label for row in node.limit_rows]),
-        True,
     )
+
+
+def met_alike(
+    model: Model, requirements: Sequence[Requirement], reduction: Reduction
+) -> list[Requirement]:
+    """The requirements of quantities that `equal_legs` can change."""
+    node, rng = model.node, np.random.default_rng(2)
+    names = list(dict.fromkeys(w.quantity.name for w in requirements))
+    values = ca.Function(
+        "values",
+        [node.q, node.v, node.s, node.lam, node.u],
+        [ca.vertcat(*(quantity_expression(model, name) for name in names))],
+    )
+    q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
+
+    def drawn() -> Matrix:
+        sizes = {group: matrix.shape[1] for group, matrix in reduction.B.items()}
+        full = {g: reduction.expand(g, rng.uniform(0.1, 1.0, size)) for g, size in sizes.items()}
+        rates = reduction.expand("q", rng.normal(size=sizes["q"]))
+        point = (q + 0.1 * full["q"], rates, full["s"], full["lam"], full["u"])
+        return np.array(values(*point)).ravel()
+
+    changes = np.ptp([drawn() for _ in range(3)], axis=0) > 1e-9
+    return [w for w in requirements if changes[names.index(w.quantity.name)]]
 
 
 def image_matrices(model: Model) -> dict[str, Matrix]:

@@ -6,6 +6,7 @@ loaded only from a folder that belongs to the user and that nobody else can writ
 every process compiles anew.
 """
 
+import gc
 import hashlib
 import pickle
 from collections.abc import Callable, Iterator
@@ -51,7 +52,7 @@ def entry(function: Function) -> Function:
     def call(*arguments: Any) -> Any:
         nonlocal made
         if not made.overloads:
-            with _COMPILING, _settings(), alone(FOLDER):
+            with _COMPILING, _settings(), alone(FOLDER), _uncollected():
                 types = tuple(numba.typeof(value) for value in arguments)
                 try:
                     made.compile(types)
@@ -73,6 +74,18 @@ def is_kept(function: Callable[..., Any]) -> bool:
         return bool(made.overloads) or (file is not None and bool(file._load_index()))
     except (OSError, EOFError, pickle.UnpicklingError):  # a damaged cache
         return False
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """No search for garbage: the compiler makes millions of small things, an eighth of its time."""
+    before = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if before:
+            gc.enable()
 
 
 @contextmanager
