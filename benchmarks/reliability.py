@@ -11,6 +11,7 @@ from typing import Any
 
 from kemba.config import load_yaml
 from kemba.files import atomic_text, read_json
+from kemba.scenarios.share import wilson
 
 CARD = Path(__file__).resolve().parent.parent / "benchmarks" / "pages" / "reliability.md"
 TIMES = {
@@ -33,7 +34,11 @@ def card(*folders: Path) -> str:
     parts = [(read_json(f / "results.json"), load_yaml(f / "sweep.yaml").data) for f in folders]
     blocks = {name: block for results, _ in parts for name, block in results["blocks"].items()}
     asked = {name: block for _, sweep in parts for name, block in sweep["blocks"].items()}
-    cases = [row for results, _ in parts for row in results["cases"]]
+    cases = [r for results, _ in parts for r in results["cases"] if r["status"] != "missing"]
+    left = sum(
+        results["blocks"][name]["unfinished"] for results, _ in parts for name in results["blocks"]
+    )
+    blocks = {name: block for name, block in blocks.items() if block["unfinished"] < block["cases"]}
     first, states = parts[0][0], sorted({_state(results) for results, _ in parts})
     lines = [
         "# Reliability card",
@@ -48,6 +53,7 @@ def card(*folders: Path) -> str:
         *WORDS,
         "",
         *_rates(blocks, cases),
+        *(["", f"{left} cases of these sweeps are not run yet."] if left else []),
     ]
     for name, block in blocks.items():
         rows = [row for row in cases if row["block"] == name]
@@ -70,10 +76,11 @@ def _rates(blocks: dict[str, Any], rows: list[dict[str, Any]]) -> Iterator[str]:
         plans = sum(row["status"] in ("solved", "acceptable") for row in own)
         replaying = sum(bool(row["refined"] and row["replays"]) for row in own)
         first = sum(row["start"] == "guess" for row in own)
-        low, high = block["interval"]
+        good = sum(row["good"] for row in own)
+        low, high = wilson(good, len(own))
         yield (
             f"| {name} | {plans} | {replaying} | {first} "
-            f"| {block['succeeded']} of {block['cases']} ({block['rate']:.1%}) "
+            f"| {good} of {len(own)} ({good / len(own):.1%}) "
             f"| {low:.1%} to {high:.1%} | {block['expected']:.0%} |"
         )
 
