@@ -25,7 +25,8 @@ TIMES = {
 WORDS = """\
 *Refined and replaying*: refined, and both the plan's inputs and its `controller.csv` come out as
 planned on the plan's own model. *Good*: also the simulated robot (the plant) keeps to the
-tolerances of the task, which is what `kemba-opt solve` needs for exit code 0.
+tolerances of the task, which is what `kemba-opt solve` needs for exit code 0. Where wall times are
+much longer than CPU times, other work ran beside.
 """.splitlines()
 
 
