@@ -9,8 +9,7 @@
 # swings in a second, keeps 101 % of its energy by Euler and implicitfast, 100 % by RK4, and 17 %
 # by `discrete` with the default step of 2 ms; 64 % with 0.5 ms. What is lost is that of a damper
 # of step times stiffness, 1.8 N.s/m here, to 1 %. A position servo of the same gain loses as
-# much. The bounce of a foot on the ground changes little (13.2 -> 14.1 % of the speed), so that
-# nothing else looks odd.
+# much.
 #
 # Why it matters: legs on air or steel springs, and hops that live on them, die out within a few
 # strides; a fit of the joint's damping to such a twin finds the time step. Subtract step times

@@ -103,13 +103,13 @@ def _is_word(text: str) -> bool:
     return not any(map(str.isdigit, text)) and times.seconds(np.array([text] * 2)) is None
 
 
-def no_time(raw: Raw, values: Mapping[str, Array], decimal: str) -> tuple[str, str, str, int]:
-    """Why none of the columns (n,) is a time, what to do, and the column and row from 0 where it
-    shows; no column, and -1, where it shows at none."""
+def no_time(raw: Raw, values: Mapping[str, Array], decimal: str) -> tuple[str, str, int]:
+    """Why none of the columns (n,) is a time, what to do, and the row from 0 in which it shows; -1
+    where it shows in none."""
     rows = len(next(iter(raw.values()), ()))
     if len(raw) > max(5 * rows, SEVERAL):
         turned = "pandas.read_csv(FILE, header=None, index_col=0).T.to_csv(FILE, index=False)"
-        return "it lies on its side: its channels are rows", turned, "", -1
+        return "it lies on its side: its channels are rows", turned, -1
     for name, cells in raw.items():
         if cells.dtype != object:
             continue
@@ -119,26 +119,21 @@ def no_time(raw: Raw, values: Mapping[str, Array], decimal: str) -> tuple[str, s
             if 0.0 < wrong.mean() < ODD:
                 row = int(np.argmax(wrong))
                 what = f"'{cells[row]}' stands in the column '{name}', whose other cells are {kind}"
-                return (
-                    what,
-                    "is this line a remark, or a second header? Then take it out",
-                    name,
-                    row,
-                )
+                return what, "is this line a remark, or a second header? Then take it out", row
     for name, cells in raw.items():
         if not says_time(name):
             continue
         read = values.get(name, times.seconds(cells) if cells.dtype == object else None)
         if read is None:
-            return f"'{name}' holds '{cells[0]}', which is no time that is known", STEPS, "", -1
+            return f"'{name}' holds '{cells[0]}', which is no time that is known", STEPS, -1
         steps = np.diff(read[np.isfinite(read)])
         if np.mean(steps < 0) > 0.5:
             what = f"'{name}' falls from row to row: its last row stands first"
-            return what, "turn the order of the rows around", "", -1
+            return what, "turn the order of the rows around", -1
         still = f"'{name}' stays the same in {np.mean(steps == 0):.0%} of the steps between rows"
         why = "it has too few digits, is coarser than the rows, or these are of many channels"
-        return f"{still}: {why}", STEPS, "", -1
-    return f"no column rises from row to row like a time; it holds {held(raw)}", STEPS, "", -1
+        return f"{still}: {why}", STEPS, -1
+    return f"no column rises from row to row like a time; it holds {held(raw)}", STEPS, -1
 
 
 STEPS = (

@@ -234,9 +234,9 @@ def draft_map(
     values = numbers(raw.columns, trial.decimal, gone)
     stamp = stamp_of(raw.columns, values, names)
     if stamp is None:
-        what, hint, name, row = no_time(raw.columns, values, trial.decimal)
-        where = f"{path}:{line_of(path, trial, row)}" if text and name else str(path)
-        raise KembaError(where, what, "a time that rises was expected" * (not name), hint)
+        what, hint, row = no_time(raw.columns, values, trial.decimal)
+        where = f"{path}:{line_of(path, trial, row)}" if text and row >= 0 else str(path)
+        raise KembaError(where, what, "a time that rises was expected" * (row < 0), hint)
     rest = {n: v for n, v in values.items() if n not in {*stamp.names, *raw.clocks.values()}}
     rest, names, turned = quaternions(rest, names)
     names, said = upright(rest, names)
