@@ -5,7 +5,7 @@ It is of second order, exact for a lag of constant input however short, and stab
 are stiff: air that flows between nearly equal pressures answers within a fifth of a millisecond.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -21,6 +21,7 @@ from kemba.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Index = np.ndarray[Any, np.dtype[np.int_]]
+Known = Trajectory | Mapping[str, float]
 
 
 # s; time after which states count as at rest; a leak would empty any tank in the end (ten times
@@ -125,20 +126,64 @@ def at_rest(model: Model, q: Any, u: Any) -> Array:
     return _KNOWN[model](q, u)
 
 
-def told_by(model: Model, s: Array, plan: Trajectory) -> dict[int, Array]:
+def told_by(model: Model, s: Array, plan: Known) -> dict[int, Array]:
     """Effect states (n,), by their number, that follow from what a plan has of the model's outputs:
     the pressure of a chamber from its force. Outputs are linear in such a state; `s` (ns,): where
     the slope is taken. States that the plan itself has are left out."""
     node, found = model.node, dict[int, Array]()
-    unknown = {str(node.s[i]): i for i, q in enumerate(model.states.values()) if q.name not in plan}
-    for name, value in node.outputs.items() if unknown else ():
-        symbols = {str(symbol) for symbol in ca.symvar(ca.SX(value))}
-        if name in plan and len(symbols) == 1 and (own := symbols & set(unknown)):
-            i = unknown[own.pop()]
+    unknown = [i for i, q in enumerate(model.states.values()) if q.name not in plan]
+    for name, i in telling(model).items() if unknown else ():
+        if name in plan and i in unknown:
+            value = node.outputs[name]
             f = ca.Function("f", [node.s[i]], [value, ca.gradient(value, node.s[i])])
             there, slope = (float(x) for x in f(s[i]))
             found[i] = s[i] + (np.asarray(plan[name]) - there) / slope
     return found
+
+
+def telling(model: Model) -> dict[str, int]:
+    """The outputs of a model that depend on one effect state alone, with the number of that."""
+    node = model.node
+    number = {str(node.s[i]): i for i in range(node.s.numel())}
+    found = {name: ca.symvar(ca.SX(value)) for name, value in node.outputs.items()}
+    return {
+        name: number[str(symbols[0])]
+        for name, symbols in found.items()
+        if len(symbols) == 1 and str(symbols[0]) in number
+    }
+
+
+MOVES = 1e-6  # m/s or rad/s; slower is rest
+
+
+def moving_start(model: Model, plan: Trajectory) -> dict[str, float]:
+    """What a plan of `model` that begins in motion says of its first state beyond the pose: rates,
+    inputs, effect states and the outputs that tell these. Empty where it begins at rest."""
+    rates = [q.name for q in model.mechanism.velocities if q.name in plan]
+    if not any(abs(plan[name][0]) > MOVES for name in rates):
+        return {}
+    first = min(1, len(plan) - 1)  # inputs act on the interval before a node
+    inputs = {i.name: float(plan[i.name][first]) for i in model.inputs.values() if i.name in plan}
+    states = [q.name for q in model.states.values()]
+    names = [name for name in (*rates, *states, *telling(model)) if name in plan]
+    return {**inputs, **{name: float(plan[name][0]) for name in names}}
+
+
+def state_at(model: Model, q: Array, start: Mapping[str, float]) -> dict[str, float]:
+    """Rates and effect states of a machine in the pose q (nq,) at the `start` of a motion.
+
+    What the machine computes (the force of a chamber) and the start has gives the state it comes of
+    (the pressure). States of which the start says nothing are where they come to rest while its
+    inputs are held. Raises KembaError as `at_rest` does.
+    """
+    u = [start.get(i.name, 0.0) for i in model.inputs.values()]
+    s = at_rest(model, q, u)
+    for i, value in told_by(model, s, start).items():
+        s[i] = value
+    states = dict(zip((quantity.name for quantity in model.states.values()), s, strict=True))
+    known = (*states, *(v.name for v in model.mechanism.velocities))
+    given = {name: start[name] for name in known if name in start}
+    return {name: float(value) for name, value in (states | given).items()}
 
 
 def rate_of(node: Node) -> ca.SX:

@@ -10,6 +10,7 @@ from math import ceil, floor
 import numpy as np
 
 from kemba.model import Model
+from kemba.model.rest import moving_start
 from kemba.ocp.transcription.course import begin_ways, cubic
 from kemba.trajectory import Array, Trajectory
 
@@ -74,7 +75,7 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
     are the plan's at the tick, because the controller compares them with what it measures there.
     The torque is the mean of the plan over the tick, so that the angular impulse is the plan's.
     Valves are exactly 0 or 1, sent their dead time early, and their edges are rounded to ticks: see
-    `kemba.ocp.controller`.
+    `kemba.ocp.controller`. The state in which a plan in motion begins is in the metadata, `start`.
     """
     dead = max(max(model.timing(leg)) for leg in model.mechanism.legs)
     lead = int(np.ceil(max(dead, hold) / PERIOD - 1e-9))
@@ -94,11 +95,11 @@ def controller_table(model: Model, plan: Trajectory, hold: float = 0.0) -> Traje
         columns[f"{name} [{plan.unit(name)}]"] = states[name]
     for leg in model.mechanism.legs:
         columns[f"{leg}/piston/x [m]"] = states[f"{leg}/piston/x"]
-    return Trajectory(
-        (ticks - lead) / round(1 / PERIOD),
-        columns,
-        {"kind": "controller", "lead": lead / round(1 / PERIOD), **model.mechanism.scene.dump()},
-    )
+    meta = {"kind": "controller", "lead": lead / round(1 / PERIOD)}
+    if start := moving_start(model, plan):
+        meta["start"] = start
+    rows = (ticks - lead) / round(1 / PERIOD)
+    return Trajectory(rows, columns, meta | model.mechanism.scene.dump())
 
 
 def _means(time: np.ndarray, values: np.ndarray, clock: np.ndarray) -> np.ndarray:

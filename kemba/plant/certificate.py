@@ -10,45 +10,16 @@ from kemba.errors import KembaError
 from kemba.events import ends_standing
 from kemba.mechanism.knee import felt
 from kemba.model import Model, load_model
-from kemba.model.rest import at_rest, told_by
 from kemba.plant.controller import execute
 from kemba.plant.record import Impact
 from kemba.plant.replay import Replay, replay
 from kemba.stopwatch import Stage, Tell, silent
 from kemba.trajectory import Array, Trajectory
 
-STILL = 1e-6  # m/s or rad/s; slower is rest
-
-
-def begins_moving(model: Model, plan: Trajectory) -> bool:
-    """Whether a plan begins in motion, so that no execution can wait in its first pose."""
-    rates = [plan[q.name][0] for q in model.mechanism.velocities if q.name in plan]
-    return bool(np.abs(rates).max(initial=0.0) > STILL)
-
-
-def moving_start(machine: Model, plan: Trajectory) -> dict[str, float]:
-    """Coordinates, rates and effect states of a machine at the start of a plan.
-
-    What the machine computes (the force of a chamber) and the plan has gives the state it comes of
-    (the pressure). States of which the plan knows nothing are where they come to rest while the
-    first commands are held. Raises KembaError as `at_rest` does.
-    """
-    found = {q.name: float(plan[q.name][0]) for q in machine.state if q.name in plan}
-    q = np.array([found[c.name] for c in machine.mechanism.coordinates])
-    first = min(1, len(plan) - 1)  # inputs act on the interval before a node
-    u = [float(plan[i.name][first]) if i.name in plan else 0.0 for i in machine.inputs.values()]
-    s = at_rest(machine, q, u)
-    for i, values in told_by(machine, s, plan).items():
-        s[i] = values[0]
-    names = [state.name for state in machine.states.values()]
-    return {**{name: float(value) for name, value in zip(names, s, strict=True)}, **found}
-
 
 def played(machine: Model, plan: Trajectory, table: Trajectory, rest: float) -> Replay:
-    """A plan's table on a machine, from the plan's start where it begins in motion; the last
-    commands stay for `rest` [s]."""
-    start = moving_start(machine, plan) if begins_moving(machine, plan) else None
-    return execute(table, machine, extra=rest, start=start).against(machine, plan)
+    """A plan's table on a machine; the last commands stay for `rest` [s]."""
+    return execute(table, machine, extra=rest).against(machine, plan)
 
 
 SLOW = 0.01  # m/s; slower ones are no news

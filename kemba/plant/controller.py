@@ -12,10 +12,18 @@ from kemba.effects.mechanics.hip import Motor
 from kemba.errors import KembaError
 from kemba.events import STANDS
 from kemba.model import Model
+from kemba.model.rest import state_at
 from kemba.plant.commands import Commands, JointControl, Profile
 from kemba.plant.kernel.machine import Array
 from kemba.plant.replay import Replay, first_row, judge
-from kemba.plant.simulate import Condition, Simulated, lowest_foot, run_many, simulate_one
+from kemba.plant.simulate import (
+    Condition,
+    Simulated,
+    initial_values,
+    lowest_foot,
+    run_many,
+    simulate_one,
+)
 from kemba.quantity import Param
 from kemba.trajectory import SAME_TIME, Trajectory
 
@@ -83,10 +91,11 @@ def condition_of(
 ) -> Condition:
     """What `execute` simulates, in the table's clock.
 
-    The robot starts at rest in the table's first pose, changed by `start`. A robot that starts in
-    the air is held until plan time 0, and one with a rate in `start` has it at that time; its
-    motion begins there. After the last row the last commands stay for `extra` [s]. `valves` replace
-    the table's. Raises KembaError when the table lacks a column.
+    The robot starts in the table's first pose, changed by `start`, at rest where the metadata have
+    no `start` of a plan that begins in motion. A robot that starts in the air is held until plan
+    time 0, and one with a rate has it at that time; its motion begins there. After the last row the
+    last commands stay for `extra` [s]. `valves` replace the table's. Raises KembaError when the
+    table lacks a column.
     """
     gains = gains or parse({k: table.meta.get(k, v) for k, v in Gains()}, Gains)
     profiles = {
@@ -95,6 +104,8 @@ def condition_of(
         if quantity.binary
     }
     pose = {**first_row(model, table), **(start or {})}
+    if "start" in table.meta:
+        pose = {**state_at(model, initial_values(model, pose)[0], _start(table)), **pose}
     falls = lowest_foot(model, pose) > STANDS
     moves = any(pose.get(v.name) for v in model.mechanism.velocities)
     begin = 0.0 if falls or moves else float(table.time[0])
@@ -148,6 +159,16 @@ def motor_limits(motor: Motor | None) -> tuple[float, float, float]:
         return np.inf, np.inf, 1.0
     slope = motor.tau_rated / (motor.w_noload - motor.w_rated)
     return motor.tau_peak, motor.w_noload, slope
+
+
+def _start(table: Trajectory) -> dict[str, float]:
+    """The state in which the motion of a table begins, beyond its pose."""
+    start = table.meta["start"]
+    try:
+        return {str(name): float(value) for name, value in start.items()}
+    except (AttributeError, TypeError, ValueError):
+        what, expected = f"`start` is {start!r}", "the state of the first row by column name"
+        raise KembaError("controller.meta.yaml", what, expected) from None
 
 
 def _column(table: Trajectory, name: str) -> np.ndarray:

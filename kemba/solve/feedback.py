@@ -11,7 +11,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.ocp.certificate.status import Status
-from kemba.plant.certificate import begins_moving, plant_run, rest_after
+from kemba.plant.certificate import plant_run, rest_after
 from kemba.plant.controller import read_controller
 from kemba.plant.repeat import VALVE_SCATTER
 from kemba.plant.replay import Replay
@@ -45,13 +45,12 @@ def with_feedback(trial: Trial, execution: TrialOrder) -> Trial | None:
     """The trial with a policy that makes it good; None where there is none, or is none to be asked.
 
     Its inputs and its table must keep to the plan on its own model: feedback is for what a plant
-    does otherwise. A learnt model's verdict asks no plant; strides, and what begins in motion, are
-    played open loop.
+    does otherwise. A learnt model's verdict asks no plant.
     """
     done, table, found = trial.judged, trial.motions.table, trial.plan
     if done is None or table is None or found.status is not Status.SOLVED:
         return None
-    if not done.replays or done.truth.learnt or begins_moving(found.model, found.trajectory):
+    if not done.replays or done.truth.learnt:
         return None
     execution.tell("replay: with feedback of the body's pose")
     try:
