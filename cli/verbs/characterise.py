@@ -64,7 +64,7 @@ def characterise(
     from kemba.identify.logs.gate import BadData, sentence
     from kemba.identify.logs.reading import read_logs
     from kemba.identify.workflow import admitted, check_all, model_of
-    from kemba.logs import load_map, log_files
+    from kemba.logs import log_files
     from kemba.plant.characterise import characterise as fit
     from kemba.plant.published import as_json
     from kemba.quantity import to_si
@@ -73,8 +73,7 @@ def characterise(
     if out:
         fresh(out, force, endings=YAML)
     folder = _folder(figure, figures, out)
-    columns = load_map(column_map) if column_map else None
-    every = read_logs(log_files(logs), columns)
+    every = read_logs(log_files(logs), column_map)
     built, doubts = model_of(every, model), ()
     check_all(every, built)
     try:

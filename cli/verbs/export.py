@@ -50,11 +50,10 @@ def export(
         return
     if out is None:
         raise typer.BadParameter("a file was expected, such as jump.mat", param_hint="--out")
-    from kemba.logs import load_map
     from kemba.plotting.source import load_source
     from kemba.report.export import export as write
 
-    source = load_source(run, load_map(source_map) if source_map else None)
+    source = load_source(run, source_map)
     fresh(out, force)
-    path = write(source.trajectory, out, load_map(column_map) if column_map else None)
+    path = write(source.trajectory, out, column_map)
     put({"export": str(path)}, path)

@@ -39,7 +39,6 @@ def plot(
     Example: kemba-opt plot runs/jump-1
     """
     from kemba.folders import fresh, next_free
-    from kemba.logs import load_map
     from kemba.plotting import bench_logs, draw, load_sources, plot_rig
     from kemba.plotting.source import MOVIES, default_path, machine_of
     from kemba.plotting.style import FORMATS, open_window, save_figure, show_windows
@@ -57,7 +56,7 @@ def plot(
         figure = plot_rig(logs, model or "planning", figure=window)
         names, beside = list(logs), runs[0] / "figure.png"
     else:
-        sources = load_sources(runs, load_map(column_map) if column_map else None)
+        sources = load_sources(runs, column_map)
         figure = draw(sources, model, window)
         names, beside = [source.name for source in sources], default_path(sources)
     path = out or (beside if force else next_free(beside))

@@ -18,7 +18,7 @@ from kemba.errors import KembaError
 from kemba.files import read_json
 from kemba.folders import claimed
 from kemba.identify.logs.reading import read_log
-from kemba.logs import ColumnMap, load_map
+from kemba.logs import Columns
 from kemba.model import Model
 from kemba.model import load_model as load
 from kemba.model.spec import model_files
@@ -91,11 +91,10 @@ def load_model(name: Path_ = "planning", supply: float | None = None) -> Model:
     return load(name, supply=supply)
 
 
-def load_log(path: Path_, columns: ColumnMap | Path_ | None = None) -> Trajectory:
+def load_log(path: Path_, columns: Columns = None) -> Trajectory:
     """The log at `path`, of any format of `docs/logs.md`; `columns` is a column map or its file.
     Raises KembaError with row and column of the first fault."""
-    known = columns is None or isinstance(columns, ColumnMap)
-    return read_log(path, columns if known else load_map(columns))  # type: ignore[arg-type]
+    return read_log(path, columns)
 
 
 def settings(changes: dict[str, Any]) -> list[str]:

@@ -15,7 +15,6 @@ from kemba.identify.infer.significance import Identifiability, null_test
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.problem.problem import Parameter, Problem
 from kemba.identify.workflow import posed
-from kemba.logs import load_map
 from kemba.model import load_model
 from kemba.stopwatch import Tell, silent
 
@@ -91,7 +90,7 @@ def preview(
     Raises KembaError; BadData where the logs cannot be right.
     """
     tell("reading the logs")
-    read = read_logs(logs, load_map(column_map) if column_map else None)
+    read = read_logs(logs, column_map)
     problem, _ = posed(read, model, tell)
     search = Search(problem, say=tell)
     search.start()

@@ -20,7 +20,6 @@ from kemba.identify.infer.windows import error_ratio, free_starts
 from kemba.identify.logs.gate import BadData, check_logs, limits_of, sentence
 from kemba.identify.logs.reading import excerpts, read_logs, taken_on
 from kemba.identify.problem.problem import Array, Problem
-from kemba.logs import load_map
 from kemba.mechanism.robot_file import robot_files
 from kemba.model import Model, build_model, load_model, load_spec
 from kemba.model.evidence import Measured
@@ -106,9 +105,8 @@ def discover_logs(
     KembaError for files that cannot be read, and for a limit in which logs cannot be answered.
     """
     started = time.monotonic()
-    columns = load_map(column_map) if column_map else None
     say("reading the logs")
-    fitted, kept = read_logs(logs, columns), read_logs(holdout, columns) if holdout else []
+    fitted, kept = read_logs(logs, column_map), read_logs(holdout, column_map) if holdout else []
     found: Discovery | None = None
     try:
         paths = ({Path(log.meta["path"]).resolve() for log in some} for some in (fitted, kept))
@@ -261,7 +259,7 @@ def check_log(
 
     Raises KembaError where the file cannot be read; BadData where the log cannot be right.
     """
-    logs = read_logs([path], load_map(column_map) if column_map else None)
+    logs = read_logs([path], column_map)
     return logs[0], posed(logs, model)[1]
 
 
@@ -313,7 +311,7 @@ def compare_logs(
     CSV) was missed. `tell` gets the name of every stage. Raises KembaError; BadData where the logs
     cannot be right."""
     tell("reading the logs")
-    read = read_logs(logs, load_map(column_map) if column_map else None)
+    read = read_logs(logs, column_map)
     found, problem = compare_read(read, model, tell)
     if run is not None:
         plan = Trajectory.read(Path(run) / "trajectory.csv" if Path(run).is_dir() else run)

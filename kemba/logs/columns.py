@@ -122,6 +122,14 @@ def load_map(name: str | Path) -> ColumnMap:
     return found
 
 
+Columns = ColumnMap | str | Path | None  # a column map, the file of one, or none
+
+
+def map_of(columns: Columns) -> ColumnMap | None:
+    """The map that is given by itself or by its file. Raises KembaError."""
+    return load_map(columns) if isinstance(columns, str | Path) else columns
+
+
 def shipped_maps(names: Collection[str]) -> list[str]:
     """The shipped maps all of whose columns are among `names`."""
     own = {name: load_map(name).columns.values() for name in shipped_configs("maps")}

@@ -27,7 +27,7 @@ from kemba.events import (
     read,
     runs,
 )
-from kemba.logs import ColumnMap, is_log_file, open_log
+from kemba.logs import Columns, is_log_file, map_of, open_log
 from kemba.mechanism import Mechanism, Robot, knee
 from kemba.model import Model, build_model, load_spec
 from kemba.quantity import to_si
@@ -81,7 +81,7 @@ def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
     return kind == "plan" if kind else path is not None and path.name == PLAN_FILE
 
 
-def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
+def load_source(path: str | Path, columns: Columns = None) -> Source:
     """The plan in a run folder, or the trajectory in a log file; `columns` maps foreign columns.
     Raises KembaError."""
     path = Path(path)
@@ -91,14 +91,15 @@ def load_source(path: str | Path, columns: ColumnMap | None = None) -> Source:
         runs = ", ".join(str(found.parent) for found in sorted(Path("runs").glob(f"*/{PLAN_FILE}")))
         expected = "a run folder or a log was expected"
         raise KembaError(str(path), what, expected, f"runs here: {runs}" if runs else "")
-    trajectory = open_log(file, columns, strict=columns is None)
+    trajectory = open_log(file, map_of(columns), strict=columns is None)
     if len(trajectory) < 2:
         raise KembaError(str(file), "has one row only", "at least two were expected")
     return Source(_name(file), trajectory, is_plan(trajectory, file), file)
 
 
-def load_sources(paths: Iterable[str | Path], columns: ColumnMap | None = None) -> list[Source]:
+def load_sources(paths: Iterable[str | Path], columns: Columns = None) -> list[Source]:
     """The runs and logs at `paths`, with names that differ; `columns`: a map for these logs."""
+    columns = map_of(columns)  # once for all
     sources = [load_source(path, columns) for path in paths]
     counts = Counter(source.name for source in sources)
     return [

@@ -8,7 +8,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.files import atomic_text
 from kemba.folders import ended
-from kemba.logs import ColumnMap, ColumnSource
+from kemba.logs import ColumnMap, Columns, ColumnSource, map_of
 from kemba.logs.formats import MODULES, writer
 from kemba.quantity import convert
 from kemba.trajectory import TIME, Array, Trajectory
@@ -16,7 +16,7 @@ from kemba.trajectory import TIME, Array, Trajectory
 FORMATS = (".csv", *(f".{ending}" for ending in MODULES))
 
 
-def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None = None) -> Path:
+def export(trajectory: Trajectory, path: str | Path, columns: Columns = None) -> Path:
     """Write the `trajectory` in the format of the ending of `path`; the path.
 
     .csv: the log format, or with `columns` what another program reads through that map backwards.
@@ -24,7 +24,7 @@ def export(trajectory: Trajectory, path: str | Path, columns: ColumnMap | None =
     .mat and .npz: one array per column, in .mat as `front_hip_tau`, and `units`. Raises KembaError
     on other endings, and when a file cannot be written.
     """
-    path = ended(path, FORMATS)
+    path, columns = ended(path, FORMATS), map_of(columns)
     text = path.suffix.lower() == ".csv"
     if columns is not None and not text:
         raise KembaError(str(path), "a column map goes with .csv only")

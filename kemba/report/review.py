@@ -14,7 +14,6 @@ from kemba.folders import place_for, typed
 from kemba.identify.answer import read_answer
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import OWN_RIGS, read_logs
-from kemba.logs import load_map
 from kemba.model import build_model, load_spec
 from kemba.plotting.source import Machine, load_machine
 from kemba.policy.modes import LATEST
@@ -316,9 +315,8 @@ def gather_material(
     asked = task if isinstance(task, dict) else {}
     judged = str(model or asked.get("model") or PLANNING)
     supply = to_si(asked["supply"], "Pa") if asked.get("supply") is not None else None
-    columns = load_map(column_map) if column_map else None
     tell("reading")
-    read = read_logs(logs, columns) if logs else []
+    read = read_logs(logs, column_map) if logs else []
     error, fault = None, None
     if read:
         try:

@@ -15,7 +15,6 @@ import kemba
 from kemba.errors import KembaError
 from kemba.files import atomic_path, atomic_text
 from kemba.folders import ended, fresh, place_for
-from kemba.logs import load_map
 from kemba.plotting.source import CYLINDER, Pose, Source, load_source, machine_of, poses
 from kemba.report.charts import script_text
 from kemba.trajectory import Array
@@ -52,7 +51,7 @@ def shown(
 ) -> tuple[Source, Source | None]:
     """The motion of a run folder or a log, and that of the run which is its ghost, if there is
     one. Raises KembaError."""
-    source = load_source(run, load_map(column_map) if column_map else None)
+    source = load_source(run, column_map)
     return source, load_source(plan) if plan else None
 
 

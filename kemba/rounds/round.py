@@ -16,7 +16,6 @@ from kemba.identify.adopt import reference, write_model
 from kemba.identify.answer import Answer
 from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import discover_logs
-from kemba.logs import load_map
 from kemba.model import Model, load_spec
 from kemba.model.model import NOMINAL_SUPPLY
 from kemba.ocp import Task, load_task, task_model
@@ -301,8 +300,7 @@ def learn(asked: Asked, folder: RunFolder, listener: Listener) -> Round:
     Raises KembaError where runs, logs and target do not fit together, or the logs cannot be right.
     """
     due = time.monotonic() + asked.time_limit
-    columns = load_map(asked.column_map) if asked.column_map else None
-    logs = read_logs(asked.logs, columns)
+    logs = read_logs(asked.logs, asked.column_map)
     past = past_of(asked.runs, logs, asked.holdout)
     run = past.runs[past.last]
     old = load_task(run.task)[0]

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kemba.errors import KembaError, map_hint, suggest
-from kemba.logs import ColumnMap, open_log
+from kemba.logs import Columns, map_of, open_log
 from kemba.logs.foreign import unwrapped, wraps
 from kemba.logs.times import one_clock
 from kemba.mechanism import Mechanism
@@ -145,9 +145,9 @@ KINDS = ("robot", "bench", "cylinder", "drive", "vessel")
 OWN_RIGS = ("cylinder", "drive", "vessel")
 
 
-def read_log(path: str | Path, columns: ColumnMap | None = None) -> Trajectory:
+def read_log(path: str | Path, columns: Columns = None) -> Trajectory:
     """One log, unchecked; `meta` has its kind and name. Raises KembaError with row and column."""
-    path = Path(path)
+    path, columns = Path(path), map_of(columns)
     log = _turned(one_clock(open_log(path, columns, strict=False)))
     log.meta.setdefault("kind", (columns and columns.kind) or kind_of(log, path))
     if log.meta["kind"] == "plan":
@@ -209,13 +209,14 @@ def _without_absurd(log: Trajectory) -> Trajectory:
     return log.with_columns(broken)
 
 
-def read_logs(paths: Sequence[str | Path], columns: ColumnMap | None = None) -> list[Trajectory]:
+def read_logs(paths: Sequence[str | Path], columns: Columns = None) -> list[Trajectory]:
     """Several logs of one kind, in the order of their names and not of the arguments.
 
     Raises KembaError for none, for unreadable ones and for robot and bench logs together.
     """
     if not paths:
         raise KembaError("", "no log given", "one or more CSV files were expected")
+    columns = map_of(columns)  # once for all
     unique = {Path(p).resolve(): Path(p) for p in paths}.values()
     logs = [read_log(p, columns) for p in sorted(unique, key=lambda p: (p.name, str(p)))]
     kinds = {log.meta["kind"] for log in logs}

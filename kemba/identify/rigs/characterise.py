@@ -20,7 +20,7 @@ from kemba.identify.infer.windows import rms
 from kemba.identify.logs.reading import excerpts, read_logs
 from kemba.identify.problem.problem import Array, Problem
 from kemba.identify.workflow import make_problem, model_of, posed
-from kemba.logs import load_map, log_files
+from kemba.logs import log_files
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -172,6 +172,6 @@ def characterise_logs(
 
     Raises KembaError; BadData where the logs cannot be right, as `compare` says it.
     """
-    read = read_logs(log_files(logs), load_map(column_map) if column_map else None)
+    read = read_logs(log_files(logs), column_map)
     given, _ = posed(read, model)
     return _fit_rig(excerpts(read)[0], model_of(read, model), given)
