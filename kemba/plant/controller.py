@@ -157,8 +157,7 @@ def motor_limits(motor: Motor | None) -> tuple[float, float, float]:
     """Peak torque [N.m], speed without load [rad/s], slope [N.m.s/rad] of a `JointControl`."""
     if motor is None:
         return np.inf, np.inf, 1.0
-    slope = motor.tau_rated / (motor.w_noload - motor.w_rated)
-    return motor.tau_peak, motor.w_noload, slope
+    return motor.tau_peak, motor.w_noload, 1.0 / motor.slope
 
 
 def _start(table: Trajectory) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """How close a motion comes to the limits of the robot: how much was used of torque and speed of the
 hips, of friction and air; energy."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -12,6 +12,7 @@ from kemba.effects.mechanics.ground import Contact
 from kemba.effects.mechanics.hip import Motor
 from kemba.effects.pneumatics.flow import ATMOSPHERE, GAS, TEMPERATURE
 from kemba.events import runs
+from kemba.identify.logs.local_fit import local_fit
 from kemba.identify.problem.noise import difference_sigma
 from kemba.mechanism import Cylinder
 from kemba.model import Model
@@ -55,9 +56,8 @@ def use_of(track: Track, model: Model, machine: Machine, leg: str) -> Use:
 
 def motor_share(motor: Motor, torque: Array, speed: Array) -> Array:
     """Torque (n,) [N.m] over what the motor gives at this speed: its peak, less at high speed."""
-    slope = (motor.w_noload - motor.w_rated) / motor.tau_rated
     driving = np.clip(speed * np.sign(torque), 0.0, None)
-    left = np.clip((motor.w_noload - driving) / slope, 1e-3, motor.tau_peak)
+    left = np.clip((motor.w_noload - driving) / motor.slope, 1e-3, motor.tau_peak)
     return np.asarray(np.abs(torque) / left)
 
 
@@ -84,13 +84,11 @@ def rate(track: Track, speed: str, position: str) -> Array:
         return t[speed]
     if position not in t or len(t) < 5:
         return np.full(len(t), np.nan)
-    from scipy.signal import savgol_filter  # it takes half a second
-
     step = float(np.median(np.diff(t.time)))
-    width = max(5, 2 * round(0.5 * SMOOTH / step) + 1)
-    if width > len(t):
+    width = max(2, round(0.5 * SMOOTH / step))
+    if 2 * width + 1 > len(t):
         return np.gradient(t[position], t.time)
-    return np.asarray(savgol_filter(t[position], width, 2, deriv=1, delta=step))
+    return local_fit(t[position], width, step, 2, 1)
 
 
 def full_for(track: Track, share: Array) -> float:
@@ -155,14 +153,6 @@ def air_drawn(track: Track, leg: str, cylinder: Cylinder) -> float | None:
     return drawn if found else None
 
 
-def envelope(motor: Motor) -> Iterable[tuple[float, float]]:
-    """Corners of what the motor can give: driving speed [rad/s], torque [N.m]."""
-    slope = (motor.w_noload - motor.w_rated) / motor.tau_rated
-    yield -motor.w_noload, motor.tau_peak
-    yield max(0.0, motor.w_noload - slope * motor.tau_peak), motor.tau_peak
-    yield motor.w_noload, 0.0
-
-
 @dataclass(frozen=True)
 class Energy:
     """Work (rows,) [J] since the start of the pistons and of the hips; energy that impacts take
@@ -216,14 +206,6 @@ def _summed(powers: Sequence[Array | None], track: Track) -> Array | None:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def put_in(work: Array | None) -> tuple[float, float] | None:
-    """Energy [J] put in, and taken out again."""
-    if work is None:
-        return None
-    steps = np.diff(work)
-    return float(steps[steps > 0].sum()), float(-steps[steps < 0].sum())
-
-
 WIDE, HIGH, LEFT, BOTTOM = 420.0, 200.0, 34.0, 26.0
 POINTS = 300  # of each curve
 DASHED = ' stroke-dasharray="5 3"'
@@ -242,7 +224,9 @@ def torque_speed(leg: str, tracks: Sequence[Track], uses: Sequence[Use], motor: 
         y = HIGH - BOTTOM - torque / (1.08 * motor.tau_peak) * (HIGH - BOTTOM - 4)
         return f"{x:.1f},{y:.1f}"
 
-    border = " ".join(at(max(speed, low), torque) for speed, torque in envelope(motor))
+    corner = max(0.0, motor.w_noload - motor.slope * motor.tau_peak)  # up to it, the peak is given
+    given = (low, motor.tau_peak), (corner, motor.tau_peak), (motor.w_noload, 0.0)
+    border = " ".join(at(*place) for place in given)
     lines = "".join(
         f'<polyline points="{" ".join(at(*pair) for pair in zip(speed, torque, strict=True))}" '
         f'fill="none" stroke="{colour(tracks, i)}" stroke-width="1.2"'
@@ -431,8 +415,11 @@ def _or_dash(value: float | None, factor: float, unit: str) -> str:
 
 
 def _both(work: Array | None) -> tuple[str, str]:
-    pair = put_in(work)
-    return (f"{pair[0]:.1f} J", f"{pair[1]:.1f} J") if pair else ("-", "-")
+    """Energy put in, and taken out again."""
+    if work is None:
+        return "-", "-"
+    steps = np.diff(work)
+    return f"{steps[steps > 0].sum():.1f} J", f"{-steps[steps < 0].sum():.1f} J"
 
 
 def _air(one: Energy) -> str:

@@ -25,9 +25,13 @@ class Motor(Effect):
         peak = self.tau_peak
         return {"tau": Quantity("hip/tau", "N.m", -peak, peak, 10.0, doc="hip torque")}
 
+    @property
+    def slope(self) -> float:
+        """Speed that is lost per torque [rad.s-1/(N.m)]."""
+        return (self.w_noload - self.w_rated) / self.tau_rated
+
     def evaluate(self, at: At) -> Contribution:
-        slope = (self.w_noload - self.w_rated) / self.tau_rated
-        w, tau = at.hip.v, at.tau
+        w, tau, slope = at.hip.v, at.tau, self.slope
         return Contribution(
             effort={"hip": tau},
             limits={
