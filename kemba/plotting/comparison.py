@@ -11,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, FigureBase, SubFigure
 
-from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
+from kemba.identify.compare.bins import MODES, PHASES, ConditionBin, order_of
 from kemba.identify.compare.compare import Comparison
 from kemba.identify.compare.force_profiles import ForceProfile
+from kemba.identify.compare.words import owner
 from kemba.identify.problem.problem import MissingForce
 from kemba.plotting.style import (
     BLACK,
@@ -175,7 +176,6 @@ def name_conditions(axes: Axes, levels: Sequence[Condition]) -> None:
                 axes.axvline(start - 0.5, color=line[0], lw=line[1])
 
 
-REGIONS = ("", "in", "mid", "out")
 WIDEST = 26  # columns of one heat map; more are shown in two, one below the other
 CLOSE = 14  # columns above which there is room for the first letters of words only
 BANDS = 3
@@ -203,7 +203,7 @@ def plot_comparison(found: Comparison) -> Figure:
 
 def columns_of(listed: Sequence[ConditionBin]) -> list[list[Column]]:
     """The conditions that were visited, in one table or, when there are many, in two."""
-    order = sorted({(c.phase, c.mode, c.region) for c in listed}, key=place_of)
+    order = sorted({(c.phase, c.mode, c.region) for c in listed}, key=order_of)
     if len(order) <= WIDEST:
         return [order]
     half = len(order) / 2
@@ -222,12 +222,6 @@ def in_words(columns: Sequence[Column]) -> list[tuple[str, ...]]:
         labels = (f"{head}\n{last}" if len(head) > 2 else words, modes.get(mode, mode), region)
         found.append(labels if any(column[2] for column in columns) else labels[:2])
     return found
-
-
-def place_of(column: Column) -> tuple[int, str, int]:
-    """Sort key of a column: place of its phase, valve mode, place of its region."""
-    phase, mode, region = column
-    return [*PHASES, phase].index(phase), mode, REGIONS.index(region)
 
 
 def heat_height(listed: Sequence[ConditionBin], tables: Sequence[list[Column]]) -> float:
@@ -284,17 +278,11 @@ def bands_of(missing: Sequence[MissingForce], after: Sequence[MissingForce] = ()
     low, high = worst.band()
     found = []
     for k in sorted(order.tolist()):
-        label = f"{_owner(worst.channels[k])}\nd [{worst.units[k]}]"
+        label = f"{owner(worst.channels[k])}\nd [{worst.units[k]}]"
         own = (worst.force[:, k], low[:, k], high[:, k])
         explained = worst.force[:, k] - after[at].force[:, k] if after else None
         found.append(Band(label, worst.time, *own, explained, worst.stance))
     return found
-
-
-def _owner(channel: str) -> str:
-    if channel == "piston/F":
-        return "rod"
-    return channel.replace("piston/x", "rod").replace("hip/q", "hip").replace("/", " ")
 
 
 def panels_of(found: Sequence[ForceProfile]) -> list[ForceProfile]:

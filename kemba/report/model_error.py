@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import enumerated
-from kemba.identify.compare.bins import MODES, PHASES, ConditionBin
+from kemba.identify.compare.bins import MODES, PHASES, ConditionBin, order_of
 from kemba.identify.compare.compare import Comparison
+from kemba.identify.compare.words import owner, usual_unit
 from kemba.identify.problem.problem import MissingForce
 from kemba.identify.workflow import check_all, compare_read, model_of
 from kemba.report.charts import COMPARED, Book, Chart, Curve, meter, onto, picture, table
@@ -128,7 +129,7 @@ def heat_table(bins: Sequence[ConditionBin]) -> str:
         key = (one.channel, one.phase, one.mode)
         if key not in cells or one.ratio > cells[key].ratio:
             cells[key] = one
-    columns = sorted({(b.phase, b.mode) for b in bins}, key=_place)
+    columns = sorted({(b.phase, b.mode) for b in bins}, key=order_of)
     phases = list(dict.fromkeys(phase for phase, _ in columns))
     top = "".join(
         f'<th scope="col" colspan="{sum(p == phase for p, _ in columns)}">'
@@ -148,11 +149,6 @@ def heat_table(bins: Sequence[ConditionBin]) -> str:
         f'<div class="wide"><p class="soft">{caption}</p><table class="heat">'
         f"<tr><th></th>{top}</tr><tr><th>channel</th>{head}</tr>{''.join(rows)}</table></div>"
     )
-
-
-def _place(column: tuple[str, str]) -> tuple[int, str]:
-    phase, mode = column
-    return [*PHASES, phase].index(phase), mode
 
 
 def _cell(one: ConditionBin | None) -> str:
@@ -189,14 +185,13 @@ def error_tables(error: ModelError, total: int) -> str:
     """The sentence of the comparison, the heat map, and errors by channel."""
     found = error.found
     largest = max((c.ratio for c in found.channels), default=1.0)
-    rows = [
-        (
-            escape(_readable(c.name)[0]),
-            *(f"{_readable(c.name)[1] * value:.2g}" for value in (c.rmse, c.max, c.noise_sigma)),
-            meter(c.ratio / largest, f"{c.ratio:.1f}"),
-        )
-        for c in found.channels
-    ]
+    rows = []
+    for c in found.channels:
+        name, _, unit = c.name.rstrip("]").partition(" [")
+        usual, factor = usual_unit(unit)
+        sizes = (f"{factor * value:.2g}" for value in (c.rmse, c.max, c.noise_sigma))
+        bar = meter(c.ratio / largest, f"{c.ratio:.1f}")
+        rows.append((escape(f"{name} [{usual}]"), *sizes, bar))
     heads = ("channel", "RMS error", "largest", "noise", "error / noise")
     who = f"Model: {found.model}. Logs: {', '.join(error.logs)}"
     if total > len(error.logs):
@@ -211,15 +206,6 @@ def error_tables(error: ModelError, total: int) -> str:
             "</div>",
         ]
     )
-
-
-def _readable(header: str) -> tuple[str, float]:
-    """A channel's header in millimetres, degrees and bar, and the factor from SI."""
-    usual = (("[m]", "[mm]", 1e3), ("[rad]", "[deg]", 180.0 / np.pi), ("[Pa]", "[bar]", 1e-5))
-    for unit, better, factor in usual:
-        if header.endswith(unit):
-            return header.replace(unit, better), factor
-    return header, 1.0
 
 
 def missing_charts(book: Book, error: ModelError, clock: Callable[[str], float]) -> str:
@@ -242,8 +228,7 @@ def missing_charts(book: Book, error: ModelError, clock: Callable[[str], float])
 def _band(book: Book, missing: MissingForce, k: int, clock: float) -> str:
     ends, time = missing.band(), missing.time + clock
     force, low, high = (onto(book.grid, time, of[:, k]) for of in (missing.force, *ends))
-    channel = missing.channels[k].replace("piston/x", "rod").replace("hip/q", "hip")
-    title, unit = f"Missing on {channel.replace('/', ' ')}, 95 % band", missing.units[k]
+    title, unit = f"Missing on {owner(missing.channels[k])}, 95 % band", missing.units[k]
     stands = [(a + clock, b + clock) for a, b in missing.stance]
     lines = [Curve("missing", force)]
     return book.add(Chart(title, unit, lines, (low, high), levels=(0.0,), stands=stands))

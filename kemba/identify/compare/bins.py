@@ -39,6 +39,13 @@ PHASES = {
     "moving": "moving",
 }
 MODES = {"00": "closed", "10": "extend", "01": "retract", "11": "both"}
+REGIONS = ("", "in", "mid", "out")
+
+
+def order_of(condition: Sequence[str]) -> tuple[int, str, int]:
+    """Sort key of a phase, valve mode and, where it is told, region of the stroke."""
+    phase, mode, region = (*condition, "")[:3]
+    return [*PHASES, phase].index(phase), mode, REGIONS.index(region)
 
 
 class BinSettings:

@@ -68,9 +68,20 @@ def quantity(channel: str) -> str:
 def off_by(header: str, error: float) -> str:
     """An error [SI] of a column in words and in a usual unit: `body height 19 mm`."""
     name, _, unit = header.rstrip("]").partition(" [")
-    better = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0)), "Pa": ("bar", 1e-5)}
-    usual, factor = better.get(unit, (unit, 1.0))
+    usual, factor = usual_unit(unit)
     return f"{quantity(name)} {short(factor * error)} {usual}"
+
+
+def usual_unit(unit: str) -> tuple[str, float]:
+    """The unit in which errors are told: mm, deg and bar for those of SI; and the factor to it."""
+    better = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0)), "Pa": ("bar", 1e-5)}
+    return better.get(unit, (unit, 1.0))
+
+
+def owner(channel: str) -> str:
+    """What a force acts on, as figures name it: `front rod`, `rear hip`, `body z`."""
+    own = channel.replace("piston/x", "rod").replace("hip/q", "hip").replace("/", " ")
+    return "rod" if channel == "piston/F" else own
 
 
 def effort(channel: str, unit: str) -> str:
