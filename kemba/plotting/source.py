@@ -75,12 +75,6 @@ class Source:
         return [(time[a], time[b]) for a, b in runs(on.astype(bool))]
 
 
-def is_plan(trajectory: Trajectory, path: Path | None = None) -> bool:
-    """Whether the rows are nodes of a plan: by its metadata, or without them by its file name."""
-    kind = trajectory.meta.get("kind")
-    return kind == "plan" if kind else path is not None and path.name == PLAN_FILE
-
-
 def load_source(path: str | Path, columns: Columns = None) -> Source:
     """The plan in a run folder, or the trajectory in a log file; `columns` maps foreign columns.
     Raises KembaError."""
@@ -94,7 +88,8 @@ def load_source(path: str | Path, columns: Columns = None) -> Source:
     trajectory = open_log(file, map_of(columns), strict=columns is None)
     if len(trajectory) < 2:
         raise KembaError(str(file), "has one row only", "at least two were expected")
-    return Source(_name(file), trajectory, is_plan(trajectory, file), file)
+    kind = trajectory.meta.get("kind")  # rows are nodes of a plan by it, else by the file's name
+    return Source(_name(file), trajectory, kind == "plan" if kind else file.name == PLAN_FILE, file)
 
 
 def load_sources(paths: Iterable[str | Path], columns: Columns = None) -> list[Source]:

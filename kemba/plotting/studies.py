@@ -44,7 +44,8 @@ def draw_discovery(found: Discovery, folder: Path) -> list[Path]:
     figures = {"heat_map": plot_cells(found), "residual": plot_residual(found)}
     figures["missing_force"] = plot_explained(found)
     if len(found.answer.ladder) > 1:
-        figures["ladder"] = plot_steps(found)
+        names, unseen = zip(*found.answer.ladder, strict=True)
+        figures["ladder"] = plot_ladder(names, found.fitted, unseen)
     return [save_figure(f, folder / f"{name}.png") for name, f in figures.items()]
 
 
@@ -81,26 +82,15 @@ def plot_explained(found: Discovery) -> Figure:
     return plot_bands(bands_of(before, after), " + ".join(found.best))
 
 
-def plot_steps(found: Discovery) -> Figure:
-    """Errors of fitted and held-out data as effects are added: the numbers of the answer."""
-    names, unseen = zip(*found.answer.ladder, strict=True)
-    return plot_ladder(names, found.fitted, unseen)
-
-
-def _residuals(found: Discovery) -> tuple[Rows, dict[str, Array]]:
-    search = found.search
-    before = search.problem.residual(search.points[NULL].fit.theta)
-    tables = {"before": before}
-    if found.best:
-        tables["after"] = search.problem.residual(search.points[found.best].fit.theta)
-    return search.problem.rows(), tables
-
-
 @paper_style
 def plot_residual(found: Discovery) -> Figure:
     """Whitened residual before and after, of the channel and in the seconds where the answer
     explains most; where nothing was found, where the error is largest."""
-    rows, residuals = _residuals(found)
+    search, rows = found.search, found.search.problem.rows()
+    steps = {"before": NULL, **({"after": found.best} if found.best else {})}
+    residuals = {
+        when: search.problem.residual(search.points[h].fit.theta) for when, h in steps.items()
+    }
     squares = residuals["before"] ** 2 - residuals.get("after", np.zeros(1)) ** 2
     own = _most(rows, squares)
     time = rows.time[own]

@@ -13,7 +13,7 @@ from kemba.identify.infer.linear import NULL, SpikeSlabSettings, probabilities
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, material
 from kemba.identify.infer.verdict import caveats_of, values, verdict_on
-from kemba.plotting.studies import plot_steps
+from kemba.plotting.comparison import plot_ladder
 
 
 def test_the_right_effect_is_named_with_its_value() -> None:
@@ -51,7 +51,8 @@ def test_as_many_effects_are_found_as_the_data_carry() -> None:
 def test_the_figure_of_an_answer_does_not_depend_on_what_is_refitted_later() -> None:
     found = discover(Toy({"kick.a": -9.0, "wave.a": 7.0}))
     del found.search.points["kick",]
-    plot_steps(found)
+    steps, unseen = zip(*found.answer.ladder, strict=True)
+    plot_ladder(steps, found.fitted, unseen)
     assert len(found.fitted) == len(found.answer.ladder)
 
 
