@@ -167,10 +167,8 @@ def _from_fewer(planner: Planner, found: Plan) -> Plan | None:
         return None if planner.session.control.ended() is None else found
     plain = {"grip": 1.0}  # as the coarser plan was made
     name = f"the plan on {found.task.nodes} nodes"
-    origin = Origin(
-        found.trajectory, found.model, found.requirements, name, once=True, stages=found.stages
-    )
-    near, _ = continued(replace(planner, task=task.model_copy(update=plain)), origin)
+    finer = replace(planner, task=task.model_copy(update=plain))
+    near, _ = continued(finer, found.origin(name, once=True))
     if near is not None:
         return replace(near, task=task, continued=None)
     ended = planner.session.control.ended()

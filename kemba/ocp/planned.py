@@ -13,6 +13,7 @@ from kemba.events import LASTS, PLANNED, feet, read
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate, certify, costs, gains, objective
 from kemba.ocp.certificate.status import Status, verdict
+from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.infeasibility.explain import Explanation, Relax
 from kemba.ocp.nlp.ending import Ending
 from kemba.ocp.nlp.ipopt import Iterate
@@ -73,6 +74,11 @@ class Plan:
     def iterations(self) -> int:
         """IPOPT iterations over all solves."""
         return sum(a.iterations for a in self.attempts)
+
+    def origin(self, name: str, **how: Any) -> Origin:
+        """It as the origin of another plan; `how`: further fields of `Origin`."""
+        known = self.trajectory, self.model, self.requirements
+        return Origin(*known, name, stages=self.stages, **how)
 
     @property
     def objective(self) -> float:

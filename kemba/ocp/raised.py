@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from kemba.config import Document
-from kemba.ocp.continuation.origin import Origin
 from kemba.ocp.finer import continued
 from kemba.ocp.planned import Plan
 from kemba.ocp.planner import Planner
@@ -42,10 +41,8 @@ def raised(found: Plan, planner: Planner, document: Document) -> Plan | None:
         new = min(1.0, share + step)
         session.tell(f"the scene at {new:.0%} of its height")
         name = f"the plan at {share:.0%} of its height" if share else "the plan on level ground"
-        known = found.trajectory, found.model, found.requirements
         last = step <= LEAST
-        origin = Origin(*known, name, stages=found.stages, once=not last)
-        near, _ = continued(lowered(planner, document, new), origin)
+        near, _ = continued(lowered(planner, document, new), found.origin(name, once=not last))
         if near is not None:
             found, share, step = near, new, 2.0 * step
         elif last:

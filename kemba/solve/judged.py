@@ -117,7 +117,11 @@ def judged(
     stable: Stability | None = None
     if task.periodic is not None:
         tell("replay: strides in a row")
-        stable = stability(model, plan, STRIDES, lambda motion: _played(found, motion, machine))
+
+        def play(motion: Trajectory) -> dict[str, Replay | None]:
+            return executions(model, motion, controller_table(model, motion, task.hold), machine)
+
+        stable = stability(model, plan, STRIDES, play)
         facts |= {"strides": stable.json()}
     limits = allowances(task.tolerances, landing_speed(plan))
     verdicts = {}
@@ -132,12 +136,6 @@ def judged(
         said = [*truth.remarks, *beyond(found, truth.evidence), why]
         truth = replace(truth, remarks=tuple(text for text in said if text))
     return Judged(facts, verdicts, plant_run(there) if there else None, truth, band, stable)
-
-
-def _played(found: Plan, motion: Trajectory, plant: Model) -> dict[str, Replay | None]:
-    """The executions of a longer motion made of a plan."""
-    table = controller_table(found.model, motion, found.task.hold)
-    return executions(found.model, motion, table, plant)
 
 
 def asked_of(found: Plan, done: Replay | None, allowed: Allowed) -> Sequence[MeasuredRequirement]:

@@ -76,10 +76,8 @@ def _again(
 ) -> Plan | None:
     """The plan with its valve edges on `ticks`, or with `finer` elements; None where that fails in
     one step, or where it costs so much more that another guess is likely to cost less."""
-    known = old.trajectory, old.model, old.requirements
     name = "the earlier plan" if old.continued else name
-    origin = Origin(*known, name, once=True, ticks=ticks, finer=finer, stages=old.stages)
-    near, _ = planning.continued(origin)
+    near, _ = planning.continued(old.origin(name, once=True, ticks=ticks, finer=finer))
     if near is None or near.status is not Status.SOLVED or dear(near, old.objective):
         return None
     return replace(near, continued=old.continued, start=old.start)
@@ -225,8 +223,7 @@ def in_turn(planning: Planning, old: Plan, guesses_first: bool) -> Iterator[Plan
     model, which is sooner found."""
 
     def near() -> Iterator[Plan]:
-        known = old.trajectory, old.model, old.requirements
-        found, _ = planning.continued(Origin(*known, "the plan with other air", stages=old.stages))
+        found, _ = planning.continued(old.origin("the plan with other air"))
         if found is not None:
             yield replace(found, continued=None, start=old.start)
 
@@ -266,11 +263,9 @@ def _most_robust(
         return next(planning.plans(approach.origin))
 
     def changed(found: Plan, task: Task) -> Plan | None:
-        known = found.trajectory, found.model, found.requirements
-        names = "the plan as asked", "other starts (--starts 4) may take less"
-        origin = Origin(*known, *names, once=True, stages=found.stages)
-        planning = _planning(task, document, approach, listener, deadline)
-        return planning.continued(origin)[0]
+        hint = "other starts (--starts 4) may take less"
+        origin = found.origin("the plan as asked", dear=hint, once=True)
+        return _planning(task, document, approach, listener, deadline).continued(origin)[0]
 
     found = most_robust(task, solve, changed, listener.tell, deadline)
     plan = found.plan

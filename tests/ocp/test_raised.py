@@ -21,6 +21,7 @@ def steps_of(
     those that may read phases anew."""
     tried: list[Any] = []
     solved = [0.0]
+    plan: Any = SimpleNamespace(origin=lambda name, once: SimpleNamespace(once=once))
 
     def continued(share: Any, origin: Any) -> tuple[Any, str]:
         tried.append(share)
@@ -29,7 +30,6 @@ def steps_of(
         if share - solved[-1] > widest(solved[-1]):
             return None, "no solution near"
         solved.append(share)
-        plan = SimpleNamespace(trajectory=None, model=None, requirements=(), stages=None)
         return plan, ""
 
     ended = SimpleNamespace(ended=lambda: len(tried) >= over)
@@ -37,8 +37,7 @@ def steps_of(
     monkeypatch.setattr(raised, "continued", continued)
     monkeypatch.setattr(raised, "lowered", lambda planner, document, share: share)
     monkeypatch.setattr(raised, "replace", lambda plan, **new: SimpleNamespace(**new))
-    first: Any = SimpleNamespace(trajectory=None, model=None, requirements=(), stages=None)
-    return tried, raised.raised(first, planner, SimpleNamespace())  # type: ignore[arg-type]
+    return tried, raised.raised(plan, planner, SimpleNamespace())  # type: ignore[arg-type]
 
 
 def test_steps_double_where_they_are_solved(monkeypatch: pytest.MonkeyPatch) -> None:
