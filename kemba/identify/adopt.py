@@ -18,19 +18,17 @@ COVARIANCE = "covariance.csv"
 
 
 def write_model(
-    path: Path,
-    base: str,
-    ranking: Iterable[Mapping[str, Any]],
-    effects: Iterable[str],
-    answer: Mapping[str, Any] | None = None,
+    path: Path, base: str, answer: Mapping[str, Any], effects: Iterable[str] | None = None
 ) -> Path:
-    """A model YAML at `path`: `base` with these effects of the ranking. Checked by loading it.
-
-    `answer`: the answer.json whose joint estimate these effects are; its figures, covariance and
-    evidence are written as well.
-    """
-    wanted, answer = list(effects), answer or {}
-    rows, sure = {row["effect"]: row for row in ranking}, answer.get("sure", ())
+    """A model YAML at `path`: `base` with what an answer.json has added, at its joint estimate, and
+    its figures, covariance and evidence; or with these `effects` of its ranking alone. Checked by
+    loading it."""
+    rows, wanted = {row["effect"]: row for row in answer["ranking"]}, list(effects or ())
+    if effects is None:
+        wanted = list(answer["added"])
+    else:
+        answer = {}
+    sure = answer.get("sure", ())
     support = {e: {"support": "sure" if e in sure else "likely"} for e in wanted if answer}
     listed = [item(name, rows[name]["parameters"]) | support.get(name, {}) for name in wanted]
     data = {
@@ -134,9 +132,8 @@ def adopt_answer(folder: str | Path, out: Path, only_sure: bool = False) -> tupl
     answer = read_answer(folder)
     if only_sure:
         answer = _without(answer, [e for e in answer["added"] if e not in answer["sure"]])
-    added = tuple(answer["added"])
-    write_model(out, str(answer.get("base") or "planning"), answer["ranking"], added, answer)
-    return added
+    write_model(out, str(answer.get("base") or "planning"), answer)
+    return tuple(answer["added"])
 
 
 def _without(answer: Mapping[str, Any], dropped: list[str]) -> dict[str, Any]:
@@ -186,4 +183,4 @@ def adopt_effect(folder: str | Path, effect: str, out: Path) -> Path:
     # what was found beside another structure has a meaning beside that structure only
     structure = [name for name in answer["added"] if name == ORIFICE and name != effect]
     base = str(answer.get("base") or "planning")
-    return write_model(out, base, answer["ranking"], [*structure, effect])
+    return write_model(out, base, answer, [*structure, effect])

@@ -168,9 +168,7 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
     answer.error_before = answer.error_after = stated
     if answer.writes:
         with tempfile.TemporaryDirectory() as folder:
-            data = answer.json()
-            file = Path(folder) / "model.yaml"
-            write_model(file, model, data["ranking"], answer.added, data)
+            file = write_model(Path(folder) / "model.yaml", model, answer.json())
             written = make_problem(excerpts(logs)[0], model_of(logs, str(file)))
         written = _with_noise(written)
         answer.error_after = error_ratio(written, _figures_felt(written, answer.machine))
@@ -292,7 +290,7 @@ def write_answer(answer: Answer, out: Path, model: str) -> None:
     for stale in ("model.yaml", COVARIANCE, "answer.json"):
         (out / stale).unlink(missing_ok=True)
     if answer.writes:
-        path = write_model(out / "model.yaml", model, data["ranking"], answer.added, data)
+        path = write_model(out / "model.yaml", model, data)
         answer.model = data["model"] = str(path)
     write_json(out / "answer.json", data | {"base": reference(model)})
 

@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from kemba.ocp import load_task, task_model
-from kemba.plant.certificate import rest_after
-from kemba.plant.controller import execute
 from kemba.plotting.studies import plot_executions, plot_rounds
 from kemba.plotting.style import svg_text
 from kemba.report.charts import pairs, table
 from kemba.report.verdict import ReviewVerdict
 from kemba.report.view import write_page
 from kemba.rounds.outcome import ExpectedApex
-from kemba.rounds.round import Round
+from kemba.rounds.round import Round, executed_on
 
 
 def write_learning(found: Round, folder: Path) -> Path:
@@ -56,18 +54,15 @@ def _tables(found: Round) -> Iterable[str]:
         ("model error after", f"{found.compare_after:.2f} times the noise"),
         ("logs", len(found.past.logs)),
     ])  # fmt: skip
-    executed = sum(f.apex for f in found.executed) / len(found.executed)
-    rows = [
+    yield pairs("apex of the run that was executed", [
         ("planned", f"{found.planned.apex:.4f} m"),
-        ("executed, mean", f"{executed:.4f} m"),
+        ("executed, mean", f"{found.executed_apex:.4f} m"),
         ("model before", f"{found.before.apex:.4f} m"),
         ("model after", f"{found.simulated.apex:.4f} m"),
-    ]
-    yield pairs("apex of the run that was executed", rows)
-    landed = sum(f.touchdown for f in found.executed) / len(found.executed)
+    ])  # fmt: skip
     yield pairs("touchdown of that run", [
         ("planned", _seconds(found.planned.touchdown)),
-        ("executed, mean", _seconds(landed)),
+        ("executed, mean", _seconds(found.executed_touchdown)),
         ("model before", _seconds(found.before.touchdown)),
         ("model after", _seconds(found.simulated.touchdown)),
     ])  # fmt: skip
@@ -113,8 +108,7 @@ def _executions(found: Round) -> Any:
     expected = {}
     for what, model in (("model before", task.model), ("model after", found.model)):
         built = task_model(task.model_copy(update={"model": model}))
-        rest = rest_after(built, plan, commands)
-        expected[what] = execute(commands, built, extra=rest).trajectory
+        expected[what] = executed_on(built, plan, commands)
     executed = found.past.executed[found.past.last]
     return plot_executions(executed, expected, plan)
 

@@ -21,7 +21,7 @@ from kemba.model.model import NOMINAL_SUPPLY
 from kemba.ocp import Task, load_task, task_model
 from kemba.plant.certificate import rest_after
 from kemba.plant.controller import execute, read_controller
-from kemba.plotting.source import Machine, load_machine
+from kemba.plotting.source import load_machine
 from kemba.report.solving import solve_into
 from kemba.rounds import outcome
 from kemba.rounds.correction import (
@@ -77,10 +77,12 @@ def past_of(
     for log in logs:
         place, timed = _placed(log, found)
         executed.setdefault(place, []).append(timed)
-    entries = {e["round"]: e for run in found for e in _entries(run)}
+    manifests = [run.manifest for run in found]
+    told = [e for m in manifests for e in (*m.get("learnt_before", ()), m.get(ENTRY)) if e]
+    entries = {entry["round"]: entry for entry in told}
     history = [entries[number] for number in sorted(entries)]
-    told = {path: digest for entry in history for path, digest in entry["logs"].items()}
-    earlier, remarks = _still_there(told)
+    fitted = {path: digest for entry in history for path, digest in entry["logs"].items()}
+    earlier, remarks = _still_there(fitted)
     new = [Path(log.meta["path"]) for log in logs]
     listed = {path.resolve(): path for path in [*earlier, *new] if path.is_file()}
     used = {digest for entry in history for digest in entry["logs"].values()}
@@ -118,11 +120,6 @@ def entry(past: Past, facts: dict[str, Any]) -> dict[str, Any]:
 
 def _round(run: Run) -> int:
     return int(run.manifest.get(ENTRY, {}).get("round", 0))
-
-
-def _entries(run: Run) -> list[dict[str, Any]]:
-    own = run.manifest.get(ENTRY)
-    return [*run.manifest.get("learnt_before", []), *([own] if own else [])]
 
 
 def _placed(log: Trajectory, runs: Sequence[Run]) -> tuple[int, Trajectory]:
@@ -209,6 +206,11 @@ class Round:
         return float(np.mean([f.apex for f in self.executed]))
 
     @property
+    def executed_touchdown(self) -> float:
+        """Mean executed touchdown [s]; NaN where a run did not come down."""
+        return float(np.mean([f.touchdown for f in self.executed]))
+
+    @property
     def expected_apex_error(self) -> float | None:
         """Expected minus planned apex [m] of the new run."""
         if self.aimed is None or self.target is None:
@@ -250,8 +252,8 @@ class Round:
             "inside": self.was_expected and self.was_expected.holds(self.executed_apex),
             "next_expected": self.next_expected and self.next_expected.json(),
             "unexplained_apex_m": self.correction.apex,
-            "simulated_touchdown_s": finite(self.simulated.touchdown),
-            "executed_touchdown_s": finite(float(np.mean([f.touchdown for f in self.executed]))),
+            "simulated_touchdown_s": self.simulated.touchdown,
+            "executed_touchdown_s": self.executed_touchdown,
             "remarks": list(self.remarks),
             "good": self.good,
             "sentence": self.sentence,
@@ -330,15 +332,13 @@ def _learnt(
         raise KembaError("--logs", answer.sentence, hint="see kemba-opt check LOG")
     model = old.model
     if answer.model and answer.error_after < answer.error_before:
-        data = answer.json()
-        file = write_model(out / "model.yaml", old.model, data["ranking"], answer.added, data)
-        model = str(file.resolve())
+        model = str(write_model(out / "model.yaml", old.model, answer.json()).resolve())
     machine = load_machine(old.model, scene=old.scene)
     table, plan = run.controller, run.trajectory
-    before = simulated = _simulated(task_model(old), plan, table, machine)
+    before = simulated = flight_of(executed_on(task_model(old), plan, table), machine)
     if model != old.model:
         learnt = task_model(old.model_copy(update={"model": model}))
-        simulated = _simulated(learnt, plan, table, machine)
+        simulated = flight_of(executed_on(learnt, plan, table), machine)
     return Round(
         past=past,
         model=model,
@@ -354,14 +354,9 @@ def _learnt(
     )
 
 
-def finite(value: float) -> float | None:
-    """A number as JSON has it: null where there is none."""
-    return float(value) if np.isfinite(value) else None
-
-
-def _simulated(model: Model, plan: Trajectory, table: Trajectory, machine: Machine) -> FlownJump:
-    done = execute(table, model, extra=rest_after(model, plan, table))
-    return flight_of(done.trajectory, machine)
+def executed_on(model: Model, plan: Trajectory, table: Trajectory) -> Trajectory:
+    """What a model does with the table of a plan, until it has come to rest."""
+    return execute(table, model, extra=rest_after(model, plan, table)).trajectory
 
 
 def _planned(

@@ -60,7 +60,7 @@ def test_only_first_order_chambers_can_be_replaced() -> None:
 def test_the_model_that_is_written_has_the_figures(tmp_path: Path) -> None:
     values = {**FIGURES, "a": 0.98, "level": 1.02}
     row = {"effect": ORIFICE, "parameters": {k: {"value": v} for k, v in values.items()}}
-    path = write_model(tmp_path / "model.yaml", "planning", [row], [ORIFICE])
+    path = write_model(tmp_path / "model.yaml", "planning", {"ranking": [row]}, [ORIFICE])
     assert load_spec(path).chambers == "orifice"
     model = load_model(path)
     chamber = model.effect("orifice_chamber")
