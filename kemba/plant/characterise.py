@@ -1,7 +1,7 @@
 """Air and friction of a cylinder from bench logs."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -117,29 +117,23 @@ def find_rises(log: Trajectory, stroke: float) -> Iterator[Rise]:
         return
     valves = {name: log[f"valve/{name}"] > 0.5 for name in ("extend", "retract")}
     edges = {name: np.flatnonzero(np.diff(v.astype(int))) + 1 for name, v in valves.items()}
-    every = np.sort(np.concatenate([*edges.values()]))
+    every, supply = np.concatenate([*edges.values()]), log.meta.get("supply", NOMINAL_SUPPLY)
     for chamber, indices in edges.items():
         sign, own = (1.0, x) if chamber == "extend" else (-1.0, stroke - x)
-        for edge in indices:
-            later = every[every > edge]
-            stop = int(later[0]) if len(later) else len(log)
-            switched = float(valves[chamber][edge]), float(own.mean()), stroke
-            rise = _rise(log, int(edge), stop, sign, chamber, switched)
-            if rise is not None:
-                yield rise
+        for edge in indices.tolist():
+            stop = int(min(every[every > edge], default=len(log)))
+            answer = _answer(log.time, sign * log["piston/F"], edge, stop)
+            if answer is not None:
+                u, place = float(valves[chamber][edge]), float(own.mean())
+                yield Rise(u, place, stroke, supply, chamber, *answer)
 
 
-def _rise(
-    log: Trajectory,
-    edge: int,
-    stop: int,
-    sign: float,
-    chamber: str,
-    facts: tuple[float, float, float],
-) -> Rise | None:
-    """The answer to the switching at row `edge`, until row `stop`; None where it shows nothing.
-    `facts`: the first ones of a `Rise`."""
-    force, time = sign * log["piston/F"], log.time[edge - 1 : stop] - log.time[edge]
+def _answer(
+    time: Array, force: Array, edge: int, stop: int
+) -> tuple[Array, Array, float, float] | None:
+    """Time, level, dead time and plateau, as of a `Rise`, of the switching at row `edge`, until row
+    `stop`; None where it shows nothing."""
+    time = time[edge - 1 : stop] - time[edge]
     before = float(force[max(edge - 20, 0) : edge].mean())
     after = float(force[stop - max((stop - edge) // 10, 3) : stop].mean())
     if abs(after - before) < STEP or stop - edge < ROWS:
@@ -147,9 +141,7 @@ def _rise(
     level = (force[edge - 1 : stop] - before) / (after - before)
     low, high = (_crossing(time, level, share) for share in (LOW, HIGH))
     dead = low - (high - low) * LOW / (HIGH - LOW)
-    supply = log.meta.get("supply", NOMINAL_SUPPLY)
-    u, x, stroke = facts
-    return Rise(u, x, stroke, supply, chamber, time, level, dead, max(before, after))
+    return time, level, dead, max(before, after)
 
 
 def _crossing(time: Array, level: Array, share: float) -> float:
@@ -189,6 +181,7 @@ def rise_table(rises: Iterable[Rise]) -> RiseTable:
     return RiseTable((table[0], table[1]), (table[2], table[3]), dead, r2, r2_linear)
 
 
+VALVES = ("extend", "retract")
 MODES = {(1, 0): "extend", (0, 1): "retract", (1, 1): "both", (0, 0): "none"}
 
 
@@ -274,12 +267,32 @@ class Characteristics:
     rises: RiseTable | None
     lines: list[StrokeLine]
     plateaus: dict[tuple[str, float], Estimate]
-    check: dict[str, tuple[float, float]]
+    check: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
     def effects(self) -> tuple[Chamber, ModeDamping, Valve]:
         """The fitted effects; where the logs give nothing the figures of the file are kept."""
-        return fitted_effects(self.cylinder, self.rises, self.lines, self.plateaus)
+        chamber = Chamber().of_cylinder(self.cylinder)
+        damping, valve = ModeDamping().of_cylinder(self.cylinder), Valve()
+        force = {key: abs(e.value) for key, e in self.plateaus.items()}
+        force |= {(line.mode, line.supply): abs(line.F_static.value) for line in self.lines}
+        drag = {(line.mode, line.supply): max(line.c_d.value, 0.0) for line in self.lines}
+        supplies = sorted({p for mode, p in force if mode in VALVES and p > 0.0})
+        if supplies:
+            at = {f"F_{m}": _over(force, m, supplies, chamber, f"F_{m}") for m in VALVES}
+            chamber = chamber.model_copy(update={"pressures": tuple(supplies), **at})
+        if drag:
+            known = sorted({p for _, p in drag if p > 0.0}) or list(damping.value("pressures"))
+            at = {f"c_{m}": _over(drag, m, known, damping, f"c_{m}") for m in (*VALVES, "both")}
+            rest = drag.get(("none", 0.0), damping.c_none)
+            damping = damping.model_copy(update={"pressures": tuple(known), **at, "c_none": rest})
+        if self.rises:
+            ends = {"fill": self.rises.fill, "vent": self.rises.vent}
+            times = {name: tuple(e.value for e in pair) for name, pair in ends.items()}
+            chamber = chamber.model_copy(update=times)
+            dead = float(np.mean([e.value for e in self.rises.dead.values()]))
+            valve = valve.model_copy(update={"dead_time": dead})
+        return chamber, damping, valve
 
     def write_model(self, path: str | Path, name: str = "characterised") -> None:
         """Write a model YAML: the planning model with the fitted chambers, damping and valves.
@@ -310,49 +323,14 @@ def characterise(
         expected = "bench logs as kemba-opt simulate writes them for configs/rigs were expected"
         raise KembaError("characterise", what, expected)
     table = rise_table(rises) if rises else None
-    lines, plateaus = (
-        stroke_table(strokes),
-        _means(((r.chamber, r.supply), r.plateau) for r in rises),
-    )
-    effects = fitted_effects(cylinder, table, lines, plateaus)
-    check = {}
+    plateaus = _means(((r.chamber, r.supply), r.plateau) for r in rises)
+    found = Characteristics(cylinder, table, stroke_table(strokes), plateaus, remarks=remarks)
+    effects, check = found.effects(), {}
     for name, log in logs.items():
-        if np.ptp(log["piston/x"]) > 1e-3 and any(
-            np.ptp(log[f"valve/{chamber}"]) > 0.5 for chamber in ("extend", "retract")
-        ):
+        switches = any(np.ptp(log[f"valve/{chamber}"]) > 0.5 for chamber in VALVES)
+        if np.ptp(log["piston/x"]) > 1e-3 and switches:
             check[name] = agreement(predict(cylinder, effects, log), log)
-    return Characteristics(cylinder, table, lines, plateaus, check, remarks)
-
-
-def fitted_effects(
-    cylinder: Cylinder,
-    rises: RiseTable | None,
-    lines: list[StrokeLine],
-    plateaus: dict[tuple[str, float], Estimate],
-) -> tuple[Chamber, ModeDamping, Valve]:
-    """Chamber, damping and valve with the values of the tables."""
-    chamber, damping = Chamber().of_cylinder(cylinder), ModeDamping().of_cylinder(cylinder)
-    valve = Valve()
-    force = {key: abs(e.value) for key, e in plateaus.items()}
-    force |= {(line.mode, line.supply): abs(line.F_static.value) for line in lines}
-    drag = {(line.mode, line.supply): max(line.c_d.value, 0.0) for line in lines}
-    supplies = sorted({p for mode, p in force if mode in ("extend", "retract") and p > 0.0})
-    if supplies:
-        at = {f"F_{m}": _over(force, m, supplies, chamber, f"F_{m}")
-              for m in ("extend", "retract")}  # fmt: skip
-        chamber = chamber.model_copy(update={"pressures": tuple(supplies), **at})
-    if drag:
-        known = sorted({p for _, p in drag if p > 0.0}) or list(damping.value("pressures"))
-        at = {f"c_{m}": _over(drag, m, known, damping, f"c_{m}")
-              for m in ("extend", "retract", "both")}  # fmt: skip
-        rest = drag.get(("none", 0.0), damping.c_none)
-        damping = damping.model_copy(update={"pressures": tuple(known), **at, "c_none": rest})
-    if rises:
-        times = {name: tuple(e.value for e in getattr(rises, name)) for name in ("fill", "vent")}
-        chamber = chamber.model_copy(update=times)
-        dead = float(np.mean([e.value for e in rises.dead.values()]))
-        valve = valve.model_copy(update={"dead_time": dead})
-    return chamber, damping, valve
+    return replace(found, check=check)
 
 
 def _over(
@@ -383,7 +361,6 @@ def predict(cylinder: Cylinder, effects: tuple[Any, ...], log: Trajectory) -> Tr
 
 APART = 0.02  # share by which the pressures of two supplies differ at least
 SETTLED = 0.9  # quantile of an open chamber's pressure: it fills, and falls while the rod is fast
-VALVES = ("extend", "retract")
 
 
 def tell_supplies(logs: Mapping[str, Trajectory], supplies: Sequence[float]) -> tuple[str, ...]:

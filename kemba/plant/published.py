@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from kemba.plant.characterise import Characteristics, Estimate
+from kemba.plant.characterise import Characteristics
 
 # Table I, s, at x = 0 and 70 mm
 PAPER_RISE = {"fill": (0.008, 0.025), "vent": (0.013, 0.037)}
@@ -24,10 +24,13 @@ PAPER_DEAD_TIME = 0.006  # s
 
 def as_json(found: Characteristics) -> dict[str, Any]:
     """Everything that was found, with the paper's values where it has them."""
+    ends, rises = (0.0, found.cylinder.stroke), found.rises
+    forces = [PAPER_FORCE.get((f.mode, round(f.supply, -3)), (None, None)) for f in found.lines]
     return {
         "table_1": [
             {"chamber": name, "x_m": x, **vars(estimate), "unit": "s", "paper": paper}
-            for name, x, estimate, paper in _rises(found)
+            for name in (PAPER_RISE if rises else ())
+            for x, estimate, paper in zip(ends, getattr(rises, name), PAPER_RISE[name], strict=True)
         ],
         "table_2": [
             {
@@ -37,33 +40,14 @@ def as_json(found: Characteristics) -> dict[str, Any]:
                 "c_d": {**vars(line.c_d), "unit": "N.s.m-1", "paper": paper[1]},
                 "r2": line.r2,
             }
-            for line, paper in _forces(found)
+            for line, paper in zip(found.lines, forces, strict=True)
         ],
         "dead_time": {
             name: {**vars(estimate), "unit": "s", "paper": PAPER_DEAD_TIME}
-            for name, estimate in (found.rises.dead.items() if found.rises else ())
+            for name, estimate in (rises.dead.items() if rises else ())
         },
-        "rise_r2": found.rises.r2 if found.rises else None,
-        "bilinear_r2": found.rises.r2_linear if found.rises else None,
+        "rise_r2": rises.r2 if rises else None,
+        "bilinear_r2": rises.r2_linear if rises else None,
         "check": {name: {"r2": r2, "rms_n": rms} for name, (r2, rms) in found.check.items()},
         "remarks": list(found.remarks),
     }
-
-
-def _rises(found: Characteristics) -> list[tuple[str, float, Estimate, float]]:
-    if not found.rises:
-        return []
-    return [
-        (name, x, estimate, paper)
-        for name in ("fill", "vent")
-        for x, estimate, paper in zip(
-            (0.0, found.cylinder.stroke), getattr(found.rises, name), PAPER_RISE[name], strict=True
-        )
-    ]
-
-
-def _forces(found: Characteristics) -> list[tuple[Any, tuple[float | None, float | None]]]:
-    return [
-        (line, PAPER_FORCE.get((line.mode, round(line.supply, -3)), (None, None)))
-        for line in found.lines
-    ]

@@ -16,6 +16,7 @@ import casadi as ca
 import numpy as np
 
 from kemba.errors import KembaError, suggest
+from kemba.mechanism.knee import flexion
 from kemba.model import Model, load_model
 from kemba.plant.commands import Commands, delayed
 from kemba.plant.equations import equations_of, share_equations
@@ -26,11 +27,6 @@ from kemba.trajectory import SAME_TIME, Trajectory
 
 if TYPE_CHECKING:
     from kemba.plant.player import Player
-
-
-PLACE = 1e-12  # m; error of the piston at which it ends (far below any sensor)
-TURN = 0.3  # rad; largest change of the angle at once
-ROUNDS = 50  # changes at most
 
 
 def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Array, Array]:
@@ -52,7 +48,13 @@ def initial_values(model: Model, values: Mapping[str, float]) -> tuple[Array, Ar
     start = dict(mechanism.standing)
     for piston, knee in pistons.items():
         if piston in values and knee not in values:
-            start[knee] = _knee(model, piston, knee, values[piston])
+            leg, robot = piston.split("/")[0], mechanism.need_robot()
+            try:
+                bend = flexion(robot.leg, values[piston])
+            except ValueError:
+                what = f"{piston} = {values[piston]:g} m cannot be reached"
+                raise KembaError("initial", what) from None
+            start[knee] = robot.legs[leg].fold * bend
     start.update(values)
     q = np.array([start.get(name, 0.0) for name in coordinates])
     if "body/z" in coordinates and "body/z" not in values:
@@ -76,21 +78,6 @@ def _lowest_foot(model: Model, q: Array) -> float:
     feet = [z - ground.height(x) for x, z in places]
     height = ca.Function("feet", [mechanism.q], [ca.mmin(ca.vertcat(*feet))])
     return float(height(q))
-
-
-def _knee(model: Model, piston: str, knee: str, x: float) -> float:
-    """The knee angle [rad] at a piston extension x [m], by Newton from the retracted pose."""
-    mechanism = model.mechanism
-    index = [c.name for c in mechanism.coordinates].index(knee)
-    symbol, phi = mechanism.q[index], mechanism.port(piston).phi
-    extension = ca.Function("extension", [symbol], [phi, ca.jacobian(phi, symbol)])
-    angle = mechanism.standing[knee]
-    for _ in range(ROUNDS):
-        now, slope = (float(value) for value in extension(angle))
-        angle -= float(np.clip((now - x) / slope, -TURN, TURN))
-        if abs(now - x) < PLACE:
-            return angle
-    raise KembaError("initial", f"{piston} = {x:g} m cannot be reached")
 
 
 @dataclass(frozen=True)
