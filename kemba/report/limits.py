@@ -91,12 +91,6 @@ def rate(track: Track, speed: str, position: str) -> Array:
     return local_fit(t[position], width, step, 2, 1)
 
 
-def full_for(track: Track, share: Array) -> float:
-    """For how long [s] a share is at its limit."""
-    at = np.nan_to_num(share) >= FULL
-    return float(np.sum(np.gradient(track.t.time)[at]))
-
-
 def slides(track: Track, leg: str, stands: Mask, foot: Array | None) -> float:
     """How far [m] a foot slides while it stands: by its slip speed, else by where it is."""
     t = track.t
@@ -350,13 +344,14 @@ def _limit_table(
         for leg, uses in used.items():
             foot = points[f"{leg}/foot"][:, 0] if points else None
             slid = slides(track, leg, machine.stance(track.t, leg), foot)
+            full = np.nan_to_num(uses[i].motor) >= FULL
             rows.append(
                 [
                     escape(track.name),
                     escape(leg),
                     _largest(np.abs(uses[i].torque), "N.m", 1),
                     _largest(100 * uses[i].motor, "%", 0),
-                    f"{1e3 * full_for(track, uses[i].motor):.0f} ms",
+                    f"{1e3 * np.sum(np.gradient(track.t.time)[full]):.0f} ms",
                     _largest(100 * uses[i].cone, "%", 0),
                     _or_dash(slid, 1e3, "mm"),
                     lowest,

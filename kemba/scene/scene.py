@@ -390,10 +390,10 @@ class Scene(Section):
 
     def faults(self) -> Iterator[tuple[Location, str]]:
         """What cannot be, and where: lines of terrain or obstacles that overlap."""
-        for kind, told in (("height", _shaping), ("friction", _gripping)):
+        for kind in ("height", "friction"):
             begun: list[tuple[float, int]] = []
             for i, line in enumerate(self.terrain):
-                if not told(line):
+                if not (_shaping(line) if kind == "height" else line.friction is not None):
                     continue
                 at = -np.inf if line.begin is None else line.begin
                 near = [j for other, j in begun if at == other or abs(at - other) < 2 * EDGE]
@@ -426,10 +426,6 @@ def scene_in(meta: Mapping[str, Any], where: str = "") -> Scene:
 
 def _shaping(line: Terrain) -> bool:
     return type(line) is not Terrain
-
-
-def _gripping(line: Terrain) -> bool:
-    return line.friction is not None
 
 
 def _overlap(kind: str, line: Terrain, other: int) -> str:

@@ -229,7 +229,7 @@ def draft_map(
         layout["missing"] = gone
     labels = {} if trial.header else joint_state_labels(raw.columns)
     below = zip(raw.columns, units_below(path, layout), strict=False)
-    stated = {**_spelt(below), **_spelt(raw.units.items())}
+    stated = {name: spelt(text) for name, text in (*below, *raw.units.items()) if text}
     names = Names(legs, labels, stated, switches(raw.columns), tuple(raw.columns), raw.angles)
     values = numbers(raw.columns, trial.decimal, gone)
     stamp = stamp_of(raw.columns, values, names)
@@ -276,11 +276,6 @@ def draft_map(
         tuple(filter(None, [stamp.question, *ties, *asked])),
         (f"Time: {stamp.reason}.", *said, *raw.remarks, *unwrapped, *fitting),
     )
-
-
-def _spelt(units: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """The units of columns as pint spells them."""
-    return {name: spelt(text) for name, text in units if text}
 
 
 def _kind(

@@ -132,14 +132,10 @@ def time_unit(values: Array) -> str:
     """The unit of a time column (n,) by the step between its rows; days by their number too."""
     steps = np.diff(values)
     step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
-    if is_dated(values):
+    dated = any(a < values[0] < b for a, b in DAYS)  # of spreadsheets, MATLAB or astronomers
+    if dated and 0.0 < values[-1] - values[0] < 1.0:
         return "day"
     return next((unit for unit, largest in STEP if step <= largest), "ns")
-
-
-def is_dated(values: Array) -> bool:
-    """Whether a time (n,) counts days: of spreadsheets, MATLAB or astronomers, 1980 to 2100."""
-    return any(a < values[0] < b for a, b in DAYS) and 0.0 < values[-1] - values[0] < 1.0
 
 
 def in_ours(values: Array, unit: str | None, ours: str) -> Array:

@@ -136,7 +136,9 @@ def explanation(
         return Explanation("; ".join(hints), (), False) if hints else None
     transcription, Y = outcome.transcription, outcome.point.Y
     trajectory = to_trajectory(transcription, Y)
-    limits = active_limits(task, model, trajectory)
+    # parts of a sentence: `front and rear extension valves are open throughout the push`
+    of_robot = (part(model, trajectory) for part in (_valves, _torques, _strokes, _grip))
+    limits = [*chain.from_iterable(of_robot), *_steps(task, trajectory)]
     asked = ((r, by, r.upper if by > 0 else r.lower) for r, by, _ in outcome.given)
     given = one_per_requirement(
         relax(document, r, end, 1.0 - end if r.quantity.binary else end + by)
@@ -164,12 +166,6 @@ MOSTLY = 0.6  # part of the push for which open valves are told
 PEAK = 0.95  # part of the peak torque that counts
 STEP = 0.02  # relative distance to a step's bound
 STEPS = 0.8  # part of the steps at a bound that is named
-
-
-def active_limits(task: Task, model: Model, trajectory: Trajectory) -> list[str]:
-    """Parts of a sentence: `front and rear extension valves are open throughout the push`."""
-    of_robot = (part(model, trajectory) for part in (_valves, _torques, _strokes, _grip))
-    return [*chain.from_iterable(of_robot), *_steps(task, trajectory)]
 
 
 def _stance(model: Model, trajectory: Trajectory) -> np.ndarray:

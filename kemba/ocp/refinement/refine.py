@@ -186,7 +186,8 @@ class Refiner:
         if best is self.solution:
             return found
         made = replace(read(*best), plain=found, iterations=self.iterations)
-        return made if self._keeps(made) else found
+        keeps = made.certificate is not None and made.certificate.within(self.task.tolerances)
+        return made if keeps else found
 
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended.
@@ -294,10 +295,6 @@ class Refiner:
         asked = [w for w in self.requirements if w.location[0] != "contacts"]
         fractions = [at for w in asked for at in (w.during if w.at is None else (w.at,))]
         return meshed(program.phases, lasts, nodes, fractions) or program.phases
-
-    def _keeps(self, found: Refined) -> bool:
-        """Whether a plan keeps to all that its certificate measures."""
-        return found.certificate is not None and found.certificate.within(self.task.tolerances)
 
     def build(
         self, phases: Sequence[Phase], start: Start, scheme: Scheme, elastic: float = 0.0
