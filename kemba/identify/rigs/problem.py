@@ -262,13 +262,12 @@ class RigProblem(ColouredProblem):
         bore = self.model.mechanism.bore
         if bore is None:
             return OperatingPoint.nowhere(sum(len(log.time) for log in self.logs))
-        place, speed, force = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
-        return OperatingPoint(place, speed, force, bore.stroke)
+        return OperatingPoint(*self._seen(), bore.stroke)
 
     def force_channels(self) -> list[ForceChannel]:
         """Where a force may be missing: on the rod, or on the axis."""
         sigma = np.concatenate(self._sigma)
-        place, speed, force = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
+        place, speed, force = self._seen()
         slow = np.abs(speed) < self.model.mechanism.sign_speed
         unit = "m" if self.model.mechanism.bore else self.model.mechanism.logged["axis/q"]
         quantities = {
@@ -316,15 +315,14 @@ class RigProblem(ColouredProblem):
 
     def way(self) -> tuple[Array, Flags]:
         """Position (n,) of every row, and whether it moves forward (n,)."""
-        place, speed, _ = (np.concatenate(p) for p in zip(*self._seen(), strict=True))
+        place, speed, _ = self._seen()
         return place, speed > 0.0
 
-    def _seen(self) -> list[tuple[Array, Array, Array]]:
-        """Position, rate and measured force (k,) of every run."""
-        found = []
-        for log in self.logs:
-            found.append(tuple(c[log.rows] for c in (log.q, log.v, log.others[self.answer])))
-        return found
+    def _seen(self) -> tuple[Array, Array, Array]:
+        """Position, rate and measured force (n,) of every row."""
+        runs = [(log.q, log.v, log.others[self.answer], log.rows) for log in self.logs]
+        place, speed, force = (np.concatenate([r[i][r[3]] for r in runs]) for i in range(3))
+        return place, speed, force
 
 
 def rig_problem(

@@ -101,7 +101,7 @@ def _modes(
     if constraint.friction is not None:
         names.append(constraint.friction.slip)
     evaluate = ca.Function("at", [node.q, node.v], names)
-    found = _listed(evaluate.map(len(plan))(x["q"].T, x["v"].T))
+    found = evaluate.map(len(plan)).call([x["q"].T, x["v"].T])
     values = [np.array(value).ravel() for value in found]
     if asked is not None and constraint.friction is not None:
         slides = np.abs(values[1]) > reading.slides
@@ -154,10 +154,6 @@ def _valves_first(modes: np.ndarray, valves: np.ndarray) -> None:
 def _runs(modes: np.ndarray) -> list[tuple[int, int]]:
     """Half-open ranges of rows in which a constraint is closed, the first row aside."""
     return [(a + 1, b + 1) for a, b in runs(modes[1:] != OPEN)]
-
-
-def _listed(value: object) -> list[ca.DM]:
-    return list(value) if isinstance(value, tuple | list) else [value]  # type: ignore[list-item]
 
 
 LETTERS = {OPEN: OPENED, HELD: "h", AHEAD: "a", BACK: "b"}

@@ -333,17 +333,16 @@ class PhaseProgram:
     @cached_property
     def parts(self) -> list[PhasePart]:
         """What the program consists of, in the order of its rows."""
-        c, zero = self.columns, ca.SX(0)
-        every = np.array([c.element(e) for e in range(self.nodes)])
-        body = self.element
-        found = [PhasePart(body.labels, body.z, body.g, body.f, 0.0, 0.0, every)]
-        hits = []
+        c, hits = self.columns, []
         for p in self.impacts:
             before = c.end(self.phases[p].first)
             hits.append(np.concatenate([*(before[g] for g in STATE), c.after[p], c.impulse[p]]))
-        if hits:
-            jump = self.jump
-            found.append(PhasePart(jump.labels, jump.z, jump.g, zero, 0.0, 0.0, np.array(hits)))
+        physics = (self.element, [c.element(e) for e in range(self.nodes)]), (self.jump, hits)
+        found = [
+            PhasePart(rows.labels, rows.z, rows.g, rows.f, 0.0, 0.0, np.array(columns))
+            for rows, columns in physics
+            if columns
+        ]
         return found + self.added
 
     @cached_property

@@ -51,27 +51,13 @@ RADAU3, RADAU5, RADAU9 = radau(2), radau(3), radau(5)
 
 
 @dataclass(frozen=True)
-class Element:
-    """Rows g and cost f of one element in z = [x0, (x, lam) per stage, drift, u, h], x = [q, v, s].
-
-    Closed gaps are held by their rates, and discretised they drift by micrometres. `drift`, one
-    for each gap, moves the coordinates along its gradient so that it stays zero at the end
-    (Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12-13, 1985).
-    """
+class ScaledRows:
+    """Rows g = 0 of the scaled variables z, with their labels, and a cost f."""
 
     z: ca.SX
     g: ca.SX
+    labels: tuple[str, ...]
     f: ca.SX
-    labels: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Jump:
-    """Rows g of an impact in z = [x before, v after, impulses / STEP]."""
-
-    z: ca.SX
-    g: ca.SX
-    labels: tuple[str, ...]
 
 
 def width(layout: Layout, group: str) -> int:
@@ -98,8 +84,14 @@ def element(
     cost: Mapping[str, float | CostTerm],
     scheme: Scheme,
     gaps: Sequence[ca.SX],
-) -> Element:
-    """The collocation of one element; `gaps`: of the node's coordinates, those that may close."""
+) -> ScaledRows:
+    """The collocation of one element in z = [x0, (x, lam) per stage, drift, u, h], x = [q, v, s];
+    `gaps`: of the node's coordinates, those that may close.
+
+    Closed gaps are held by their rates, and discretised they drift by micrometres. `drift`, one
+    for each gap, moves the coordinates along its gradient so that it stays zero at the end
+    (Gear, Leimkuhler and Gupta, J. Comput. Appl. Math. 12-13, 1985).
+    """
     x0 = {g: scaled(layout, g, f"{g}0") for g in STATE}
     stages = [
         {g: scaled(layout, g, f"{g}{i + 1}") for g in (*STATE, "lam")} for i in range(scheme.stages)
@@ -153,11 +145,12 @@ def element(
         u,
         h_scaled,
     ]
-    return Element(ca.vertcat(*parts), ca.vertcat(*rows), ca.densify(ca.SX(f)), tuple(labels))
+    return ScaledRows(ca.vertcat(*parts), ca.vertcat(*rows), tuple(labels), ca.densify(ca.SX(f)))
 
 
-def impact(model: Model, layout: Layout, reduction: Reduction) -> Jump:
-    """M (v+ - v-) = B impulse, from the residual's own inertia and force directions."""
+def impact(model: Model, layout: Layout, reduction: Reduction) -> ScaledRows:
+    """M (v+ - v-) = B impulse, from the residual's own inertia and force directions, in
+    z = [x before, v after, impulses / STEP]."""
     x = {g: scaled(layout, g, g) for g in STATE}
     after, impulse = scaled(layout, "v", "v_after"), scaled(layout, "lam", "impulse")
     before = node_vector(layout, x)
@@ -173,4 +166,5 @@ def impact(model: Model, layout: Layout, reduction: Reduction) -> Jump:
 
     g = dynamics(change, lam) - dynamics(rest, ca.SX.zeros(lam.numel()))
     labels = tuple(f"impact:{c.name}" for c in layout.quantities["q"])
-    return Jump(ca.vertcat(*x.values(), after, impulse), project(model, reduction, g), labels)
+    z = ca.vertcat(*x.values(), after, impulse)
+    return ScaledRows(z, project(model, reduction, g), labels, ca.SX(0))

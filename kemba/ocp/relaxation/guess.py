@@ -10,6 +10,7 @@ parabolas between the stances.
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
@@ -376,9 +377,7 @@ def automatic_guess(
     if not task.contacts:
         requirements = [r for r in requirements if r.minus is None]
     t = np.linspace(0.0, task.duration, nodes + 1)
-    f, b = robot.leg.femur.length, robot.leg.tibia.length
-    bends = [flexion(robot.leg, x) for x in (0.0, robot.stroke)]
-    low, high = (float(np.hypot(f + b * np.cos(k), b * np.sin(k))) for k in bends)
+    low, high = (float(_length(robot, flexion(robot.leg, x))) for x in (0.0, robot.stroke))
     course = (in_order if task.contacts else jump)(model, task, requirements, t, (low, high))
 
     names = [c.name for c in model.mechanism.coordinates]
@@ -404,14 +403,15 @@ def automatic_guess(
 
 def _lever(robot: Robot, bend: np.ndarray) -> np.ndarray:
     """Piston force per vertical foot force: dz/dx of the leg, by virtual work."""
-    f, b = robot.leg.femur.length, robot.leg.tibia.length
-
-    def length(k: np.ndarray) -> np.ndarray:
-        return np.asarray(np.hypot(f + b * np.cos(k), b * np.sin(k)))
-
     ahead, behind = ([extension(robot.leg, k + d) for k in bend] for d in (STEP, -STEP))
     dx = np.array(ahead, float) - np.array(behind, float)
-    return np.asarray((length(bend + STEP) - length(bend - STEP)) / dx)
+    return np.asarray((_length(robot, bend + STEP) - _length(robot, bend - STEP)) / dx)
+
+
+def _length(robot: Robot, bend: Any) -> Any:
+    """Distance [m] from hip to foot at flexions [rad]."""
+    f, b = robot.leg.femur.length, robot.leg.tibia.length
+    return np.hypot(f + b * np.cos(bend), b * np.sin(bend))
 
 
 def _efforts(

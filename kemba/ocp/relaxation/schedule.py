@@ -125,17 +125,9 @@ def refine_grid(schedule: Schedule, coarse: Transcription, point: Iterate) -> It
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
     """Y (coarse nodes + 1, n) on a finer grid (fine nodes + 1, n): states in between, inputs and
     forces held."""
-    layout = coarse.layout
-    nodes = np.linspace(0.0, coarse.nodes, fine.nodes + 1)
-    result = np.empty(fine.shape)
-    held = np.minimum(np.ceil(nodes - 1e-9).astype(int), coarse.nodes)
-    for group, part in layout.slices.items():
-        if group in ("q", "v", "s"):
-            for column in range(part.start, part.stop):
-                result[:, column] = np.interp(nodes, np.arange(coarse.nodes + 1), Y[:, column])
-        else:
-            result[:, part] = Y[held, part]
-    return result
+    at = np.linspace(0.0, coarse.nodes, fine.nodes + 1)
+    groups = coarse.layout.slices.items()
+    return np.hstack([_at_nodes(Y[:, part], at, group in HELD) for group, part in groups])
 
 
 # weights rho of the paper's penalty method (eq. 9), and of a ramp that ends there
@@ -228,4 +220,5 @@ def _at_nodes(values: np.ndarray, at: np.ndarray, held: bool) -> np.ndarray:
     if held:
         return np.asarray(values[np.ceil(at - 1e-9).astype(int)])
     rows = np.arange(len(values))
-    return np.column_stack([np.interp(at, rows, column) for column in values.T])
+    columns = [np.interp(at, rows, column) for column in values.T]
+    return np.asarray(np.reshape(columns, (values.shape[1], len(at))).T)

@@ -12,7 +12,6 @@ import casadi as ca
 import numpy as np
 
 from kemba.model import Node
-from kemba.model.model import Row
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.transcription.layout import Layout
 
@@ -42,16 +41,12 @@ def state_rows(
         first, second = node.pair_rows[i]
         for row, scale, g in ((first, 1.0, node.pair_a[i]), (second, second.scale, node.pair_b[i])):
             if _of_the_state(node, g):
-                found.append(_row("sign", row, scale, g))
+                found.append(StateRow("sign", row.label, row.unit, scale, g))
     for i in range(len(node.limit_rows)) if limits is None else limits:
         g = ca.substitute(node.limits[i], node.u, ca.SX.zeros(node.u.numel()))
         if _of_the_state(node, g):
-            found.append(_row("limit", node.limit_rows[i], 1.0, g))
+            found.append(StateRow("limit", node.limit_rows[i].label, "1", 1.0, g))
     return found
-
-
-def _row(kind: str, row: Row, scale: float, g: ca.SX) -> StateRow:
-    return StateRow(kind, row.label, "1" if kind == "limit" else row.unit, scale, g)
 
 
 def _of_the_state(node: Node, g: ca.SX) -> bool:

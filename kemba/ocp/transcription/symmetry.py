@@ -157,13 +157,9 @@ def met_alike(
     model: Model, requirements: Sequence[Requirement], reduction: Reduction
 ) -> list[Requirement]:
     """The requirements of quantities that `equal_legs` can change."""
-    node, rng = model.node, np.random.default_rng(2)
+    rng = np.random.default_rng(2)
     names = list(dict.fromkeys(w.quantity.name for w in requirements))
-    values = ca.Function(
-        "values",
-        [node.q, node.v, node.s, node.lam, node.u],
-        [ca.vertcat(*(quantity_expression(model, name) for name in names))],
-    )
+    values = _values(model, names)
     q = np.array([model.mechanism.standing[c.name] for c in model.mechanism.coordinates])
 
     def drawn() -> Matrix:
@@ -175,6 +171,12 @@ def met_alike(
 
     changes = np.ptp([drawn() for _ in range(3)], axis=0) > 1e-9
     return [w for w in requirements if changes[names.index(w.quantity.name)]]
+
+
+def _values(model: Model, names: Sequence[str]) -> ca.Function:
+    """Quantities (names,) by q, v, s, lam and u."""
+    node, wanted = model.node, [quantity_expression(model, name) for name in names]
+    return ca.Function("values", [node.q, node.v, node.s, node.lam, node.u], [ca.vertcat(*wanted)])
 
 
 def image_matrices(model: Model) -> dict[str, Matrix]:
@@ -242,13 +244,7 @@ def mirrored_requirements(model: Model, requirements: Sequence[Requirement]) -> 
     images = image_matrices(model)
     parts = [[w.quantity.name, *([w.minus.name] if w.minus else ())] for w in requirements]
     names = list(dict.fromkeys(name for part in parts for name in part))
-    node = model.node
-    values = ca.Function(
-        "values",
-        [node.q, node.v, node.s, node.lam, node.u],
-        [ca.vertcat(*(quantity_expression(model, name) for name in names))],
-    )
-    rng = np.random.default_rng(1)
+    values, rng = _values(model, names), np.random.default_rng(1)
     q = [model.mechanism.standing[c.name] for c in model.mechanism.coordinates]
     draw = {k: rng.uniform(0.1, 1.0, len(m)) for k, m in images.items()}
     point = {**draw, "q": q + 0.1 * draw["q"], "v": rng.normal(size=len(q))}
