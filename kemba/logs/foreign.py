@@ -20,7 +20,7 @@ from kemba.folders import YAML
 from kemba.logs import times
 from kemba.logs.columns import AddedColumn, ColumnMap, ColumnSource, Named
 from kemba.logs.formats import READERS, UNREAD, check_read, reader
-from kemba.logs.recording import Column, Raw, Recording
+from kemba.logs.recording import Column, Raw, Recording, some
 from kemba.logs.text import as_numbers, line_of, read_text, without
 from kemba.logs.tidy import spread
 from kemba.quantity import convert
@@ -381,9 +381,7 @@ def _own(raw: Recording, path: Path) -> Trajectory:
 
 def held(columns: Raw) -> str:
     """What a file holds, in words."""
-    names = [f"'{name}'" for name in list(columns)[:6]]
-    more = f" and {len(columns) - 6} more" if len(columns) > 6 else ""
-    return f"{', '.join(names)}{more}"
+    return some([f"'{name}'" for name in columns])
 
 
 def _numbers(values: np.ndarray[Any, Any]) -> Array | None:

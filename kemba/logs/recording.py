@@ -1,7 +1,7 @@
 """What a file of another program holds, before a map says which column is which."""
 
 import re
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -83,6 +83,12 @@ def shared(groups: Iterable[Group]) -> list[Group]:
     return found
 
 
+def some(names: Collection[str], most: int = 6) -> str:
+    """The first of many names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(list(names)[:most])}{more}"
+
+
 def by_length(vectors: Mapping[str, Column]) -> Recording:
     """Loose vectors: those of the length that most have, and those of another one that a rising
     vector called a time has too."""
@@ -99,11 +105,8 @@ def by_length(vectors: Mapping[str, Column]) -> Recording:
         if base is not None and own is not None and own != name:
             clocks[name] = own
     several = len(set(clocks.values())) > 1
-    said = [
-        f"left out, since no vector of their length is a time: {', '.join(left[:6])}"
-        f"{' and more' if len(left) > 6 else ''}"
-    ]
-    return Recording(columns, clocks=clocks if several else {}, remarks=tuple(said if left else ()))
+    said = (f"left out, since no vector of their length is a time: {some(left)}",) if left else ()
+    return Recording(columns, clocks=clocks if several else {}, remarks=said)
 
 
 def _clock_of(vectors: Mapping[str, Column], length: int) -> str | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.columns import ColumnMap, Number
-from kemba.logs.recording import Column, Raw, Recording
+from kemba.logs.recording import Column, Raw, Recording, some
 from kemba.trajectory import Array
 
 # what programs write where there is no reading, spreadsheets for a fault too
@@ -110,9 +110,8 @@ def _without_remarks(found: Raw, names: Sequence[str]) -> Recording:
     if not said:
         return Recording(found)
     left = np.delete(np.arange(len(alone)), list(said))
-    listed = ", ".join(f"'{text}'" for text in list(said.values())[:3])
-    more = f" and {len(said) - 3} more" if len(said) > 3 else ""
-    remark = f"lines that are no rows are left out: {listed}{more}"
+    listed = some([f"'{text}'" for text in said.values()], 3)
+    remark = f"lines that are no rows are left out: {listed}"
     return Recording({name: cells[left] for name, cells in found.items()}, remarks=(remark,))
 
 

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from kemba.logs.recording import Column
+from kemba.logs.recording import Column, some
 from kemba.trajectory import Array, Trajectory
 
 CLOCK = re.compile(
@@ -198,10 +198,8 @@ def one_clock(log: Trajectory) -> Trajectory:
 
 def merged(names: Collection[str], step: float) -> str:
     """The sentence about channels that were put on another clock with rows `step` [s] apart."""
-    first = ", ".join(list(names)[:3])
-    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return (
-        f"{first}{more} have a clock of their own: their readings stand in the nearest of rows "
+        f"{some(names, 3)} have a clock of their own: their readings stand in the nearest of rows "
         f"{1e3 * step:.3g} ms apart, empty between readings; commands are held"
     )
 

@@ -13,7 +13,7 @@ from kemba.logs.columns import Number
 from kemba.logs.draft import matching
 from kemba.logs.draft.words import Names, named_unit, says_time, words
 from kemba.logs.foreign import held
-from kemba.logs.recording import Raw
+from kemba.logs.recording import Raw, some
 from kemba.logs.text import OFF, ON, as_numbers, without
 from kemba.quantity import convert
 from kemba.trajectory import Array
@@ -163,8 +163,7 @@ def stamp_of(raw: Raw, values: Mapping[str, Array], names: Names) -> Clock | Non
     alike = [c for c in found[1:] if c.score > UNNAMED and _agree(best, c)]
     reason, question = best.reason, best.question
     if alike:
-        listed = ", ".join("+".join(c.names) for c in alike[:3])
-        reason += f"; as fast as {listed}{' and more' if len(alike) > 3 else ''}"
+        reason += f"; as fast as {some(['+'.join(c.names) for c in alike], 3)}"
     if COUNTER < best.score <= UNNAMED:
         asked = f"no column is called a time; is '{best.names[0]}', which rises, one?"
         question = f"{asked} {question}".strip()

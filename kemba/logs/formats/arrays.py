@@ -18,7 +18,7 @@ from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.files import write_json as write_json_file
 from kemba.logs.formats import check_size, missing
-from kemba.logs.recording import Column, Group, Raw, Recording, by_length, is_clock, recording
+from kemba.logs.recording import Column, Group, Raw, Recording, by_length, is_clock, recording, some
 from kemba.logs.times import seconds
 from kemba.trajectory import TIME, Trajectory
 
@@ -102,7 +102,7 @@ def vectors(content: Mapping[str, Any], path: Path) -> Recording:
         elif array.ndim == 2 and min(array.shape) > 1:
             found |= _matrix(name, array, arrays)
     if not any(len(array) for array in found.values()):
-        held = ", ".join(f"'{n}' of shape {a.shape}" for n, a in list(arrays.items())[:6])
+        held = some([f"'{n}' of shape {a.shape}" for n, a in arrays.items()])
         what = f"holds no vector of numbers: {held or 'nothing at all'}"
         raise KembaError(str(path), what, "one for each column was expected")
     return by_length(found)
@@ -262,9 +262,9 @@ def read_mat(path: Path) -> Recording:
         other += [] if parts else [name]
     found = [Group("", arrays[f"a{time}"], "s", columns) for time, columns in groups.items()]
     left = [name for name, array in loose.items() if array.dtype.kind in "fiub" and array.ndim == 1]
-    said = [f"left out, since they have no times: {', '.join(left[:6])}"] if left else []
+    said = [f"left out, since they have no times: {some(left)}"] if left else []
     if other:
-        said.append(f"left out, since they are not as long as their times: {', '.join(other[:6])}")
+        said.append(f"left out, since they are not as long as their times: {some(other)}")
     if index["warnings"]:
         said.append(f"damaged, or of a newer MATLAB: {'; '.join(index['warnings'][:3])}")
     return recording(found, said)
@@ -298,7 +298,7 @@ def read_h5(path: Path) -> Recording:
             group.units.update(dict.fromkeys(parts, index["units"].get(name, "")))
         elif array.ndim and array.dtype.kind != "U":
             left.append(name)
-    said = [f"left out, since they have no times: {', '.join(left[:6])}"] if left else []
+    said = [f"left out, since they have no times: {some(left)}"] if left else []
     return recording([group for group in groups.values() if group.columns], said)
 
 

@@ -10,7 +10,17 @@ import numpy as np
 
 from kemba.errors import KembaError
 from kemba.logs.formats import check_size
-from kemba.logs.recording import TIME_WORD, Column, Group, Raw, Recording, free, recording, shared
+from kemba.logs.recording import (
+    TIME_WORD,
+    Column,
+    Group,
+    Raw,
+    Recording,
+    free,
+    recording,
+    shared,
+    some,
+)
 
 ULOG_HEAD = 16  # bytes before the first message of a ULog, by its specification
 ULOG_TYPES = b"ABCDFILMOPQRS"  # of its messages, by its specification
@@ -89,8 +99,7 @@ def read_tdms(path: Path) -> Recording:
         every = [c for group in file.groups() for c in group.channels()]
         channels = [c for c in every if len(c)]
         if empty := [c.name for c in every if not len(c)]:
-            more = " and more" if len(empty) > 6 else ""
-            said.append(f"without any reading: {', '.join(empty[:6])}{more}")
+            said.append(f"without any reading: {some(empty)}")
         # data under a path that is no channel's, as where a name is damaged, nptdms leaves out
         known = {channel.path for channel in every}
         objects = file._reader.object_metadata.items()
@@ -143,7 +152,7 @@ def _plain(plain: Raw, units: dict[str, str], name: str, said: list[str]) -> Ite
     unit = "ns" if time.dtype.kind == "M" else units.get(clocks[0], "")
     columns = {n: v for n, v in plain.items() if n != clocks[0] and len(v) == len(time)}
     if short := [n for n in plain if n != clocks[0] and n not in columns]:
-        said.append(f"left out, since they are not as long as {clocks[0]}: {', '.join(short[:6])}")
+        said.append(f"left out, since they are not as long as {clocks[0]}: {some(short)}")
     yield Group("", stamps, unit, columns, {n: u for n, u in units.items() if n in columns})
 
 
