@@ -17,10 +17,10 @@ from kemba.errors import KembaError, map_hint, suggest
 from kemba.files import atomic_text
 from kemba.quantity import Quantity, is_si
 
-Table = np.ndarray[Any, np.dtype[np.float64]]
+Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def read_table(path: str | Path) -> tuple[list[str], Table]:
+def read_table(path: str | Path) -> tuple[list[str], Array]:
     """Headers (k) and numbers (n, k) of a CSV file; an empty cell is NaN.
 
     Raises KembaError with file:row:column when the file cannot be read, a header is malformed,
@@ -87,7 +87,7 @@ def check_headers(headers: Iterable[str], path: str | Path, place: Callable[[int
         seen[quantity.name] = column
 
 
-def _numbers(stream: TextIO, width: int) -> Table:
+def _numbers(stream: TextIO, width: int) -> Array:
     """The rows below the header (n, width); ValueError when one is faulty."""
     rows = _filled(stream, width)
     first = next(rows, None)
@@ -138,7 +138,6 @@ def _is_number(cell: str) -> bool:
 TIME = "time [s]"
 LISTED = 4  # columns in a repr
 SAME_TIME = 1e-9  # s; times closer than this are one
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 class Trajectory:
@@ -279,7 +278,7 @@ class Trajectory:
     def write(self, path: str | Path) -> None:
         """Write a CSV to `path`, and the sidecar when there is metadata; reading it back is exact.
         Raises KembaError when the times are not strictly increasing."""
-        check_times(self.time, str(path), first_row=2)
+        check_times(self.time, str(path))
         texts = [_texts(self.time), *(_texts(values) for values in self._columns.values())]
         with atomic_text(path) as stream:
             stream.write(",".join((TIME, *self.headers)) + "\n")
@@ -303,7 +302,7 @@ class Trajectory:
         if strict and not len(table):
             raise KembaError(str(path), "has no rows below its header")
         if strict:
-            check_times(table[:, 0], str(path), first_row=2)
+            check_times(table[:, 0], str(path))
         meta = load_yaml(sidecar(path)).data if sidecar(path).is_file() else {}
         if not isinstance(meta, dict | None):
             raise KembaError(str(sidecar(path)), "has no keys", "such as 'kind: robot'")
@@ -320,8 +319,9 @@ def sidecar(path: str | Path) -> Path:
     return Path(path).with_suffix(".meta.yaml")
 
 
-def check_times(time: Array, where: str, first_row: int) -> None:
-    """Raise KembaError at the first of the times (n,) that is not finite or does not increase."""
+def check_times(time: Array, where: str) -> None:
+    """Raise KembaError at the first of the times (n,) that is not finite or does not increase, by
+    its row in a table with one row of headers."""
     wrong = ~np.isfinite(time)
     wrong[1:] |= ~(np.diff(time) > 0)
     if not wrong.any():
@@ -330,7 +330,7 @@ def check_times(time: Array, where: str, first_row: int) -> None:
     what = "the time is missing"
     if math.isfinite(time[index]):
         what = f"the time {time[index]:.12g} s does not come after {time[index - 1]:.12g} s"
-    raise KembaError(f"{where}:{index + first_row}:1", what, "times must increase from row to row")
+    raise KembaError(f"{where}:{index + 2}:1", what, "times must increase from row to row")
 
 
 def _texts(values: Array) -> list[str]:

@@ -280,7 +280,7 @@ def open_log(path: Path, columns: ColumnMap | None = None, strict: bool = True) 
     raw = replace(raw, meta={**raw.meta, **_sidecar(path)})
     log = _own(raw, path) if columns is None else mapped(raw, columns, path)
     if strict:
-        check_times(log.time, str(path), first_row=2)
+        check_times(log.time, str(path))
     return log
 
 
