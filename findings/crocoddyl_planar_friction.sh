@@ -18,7 +18,7 @@ set -euo pipefail
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 python3 -m venv "$work/venv"
-"$work/venv/bin/pip" install --quiet crocoddyl==3.2.1 pin==4.1.0 numpy==2.4.6
+"$work/venv/bin/pip" install --quiet crocoddyl==3.2.1 pin==4.0.0 numpy==2.4.6
 "$work/venv/bin/python" - <<'EOF'
 import sys
 
