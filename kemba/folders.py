@@ -24,6 +24,7 @@ PROBE = 1_000_000  # bytes: about what a run folder takes, its solver's log incl
 
 
 YAML = (".yaml", ".yml")
+ANOTHER = "give another name, or --force to replace it (in Python: force=True)"
 
 
 def ended(path: str | Path, endings: Sequence[str], option: str = "") -> Path:
@@ -37,7 +38,7 @@ def ended(path: str | Path, endings: Sequence[str], option: str = "") -> Path:
 
 
 def fresh(
-    path: str | Path, force: bool = False, option: str = "--out", endings: Sequence[str] = ()
+    path: str | Path, force: bool = False, option: str = "", endings: Sequence[str] = ()
 ) -> Path:
     """`path` for a new file, which can be written, with one of `endings` where some are given.
     Raises KembaError.
@@ -45,13 +46,13 @@ def fresh(
     A file that is there already is kept, unless `force`.
     """
     path = Path(path)
+    where = f"{option} {path}".strip()
     if path.is_dir():
-        raise KembaError(f"{option} {path}", "is a folder", "the name of a file was expected")
+        raise KembaError(where, "is a folder", "the name of a file was expected")
     if endings:
         ended(path, endings, option)
     if path.exists() and not force:
-        hint = "give another name, or --force to replace it"
-        raise KembaError(f"{option} {path}", "exists already", hint=hint)
+        raise KembaError(where, "exists already", hint=ANOTHER)
     try_writing(path.parent)
     return path
 
@@ -95,8 +96,7 @@ def claimed(
     old, unfinished = _written(path, results), (path / UNFINISHED).exists()
     try:
         if old and not force and not unfinished:
-            hint = "give another --out, or --force to replace it"
-            raise KembaError(f"--out {path}", f"holds results already ({min(old).name})", hint=hint)
+            raise KembaError(str(path), f"holds results already ({min(old).name})", hint=ANOTHER)
         with atomic_text(path / UNFINISHED) as stream:
             stream.write(WHY)
         yield path
@@ -134,7 +134,7 @@ def lock_folder(folder: Path) -> BaseFileLock | None:
         lock.acquire(timeout=0)
     except Timeout:
         what = "another kemba-opt is writing to this folder"
-        hint = "wait until it has ended, or give another --out"
+        hint = "wait until it has ended, or give another folder"
         raise KembaError(str(folder), what, hint=hint) from None
     except NotImplementedError:
         return None

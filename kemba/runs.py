@@ -15,7 +15,7 @@ from typing import Any
 import kemba
 from kemba.errors import KembaError
 from kemba.files import read_json, sha256, write_error, write_json
-from kemba.folders import LOCK, lock_folder, try_writing, unlock
+from kemba.folders import ANOTHER, LOCK, lock_folder, try_writing, unlock
 from kemba.trajectory import Trajectory
 
 MANIFEST = "manifest.json"
@@ -206,19 +206,18 @@ def _check_usable(path: Path, force: bool = False) -> None:
     """Raise KembaError unless the folder is new, or left over from an unfinished run, or may be
     replaced by `force`."""
     if path.exists() and not path.is_dir():
-        raise KembaError(f"--out {path}", "is a file", "a new folder was expected")
+        raise KembaError(str(path), "is a file", "a new folder was expected")
     if path.is_dir() and any(item.name != LOCK for item in path.iterdir()):
         if not (path / MANIFEST).is_file():
-            raise KembaError(f"--out {path}", "holds other files", "a new folder was expected")
+            raise KembaError(str(path), "holds other files", "a new folder was expected")
         status, ended = read_manifest(path).get("status"), (path / "certificate.json").is_file()
         if status == "running" or (status == "failed" and not ended):  # an error ended it
             return
         if not force:
-            hint = "give another --out, or --force to replace it"
-            raise KembaError(f"--out {path}", "holds a finished run already", hint=hint)
+            raise KembaError(str(path), "holds a finished run already", hint=ANOTHER)
         if newest_logs(path):
-            hint = "they belong to the run that is there; give another --out"
-            raise KembaError(f"--out {path}", "holds logs", hint=hint)
+            hint = "they belong to the run that is there; give another folder"
+            raise KembaError(str(path), "holds logs", hint=hint)
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

@@ -52,7 +52,7 @@ def test_numbered_runs_do_not_meet() -> None:
 def test_a_finished_answer_is_kept() -> None:
     with claimed("answer", "answer", "*.json") as folder:
         (folder / "answer.json").write_text("1")
-    message = r"--out answer: holds results already \(answer.json\); give another --out, or --force"
+    message = r"^answer: holds results already \(answer.json\); give another name, or --force"
     with pytest.raises(KembaError, match=message), claimed("answer", "answer", "*.json"):
         pass
     with claimed("answer", "answer", "*.json", force=True) as folder:
@@ -110,7 +110,7 @@ def test_files_are_kept() -> None:
     assert fresh("a.png", force=True) == Path("a.png")
     assert next_free(Path("a.png")) == Path("a-2.png")
     assert next_free(Path("b.png")) == Path("b.png")
-    with pytest.raises(KembaError, match=r"--out \.: is a folder"):
+    with pytest.raises(KembaError, match=r"^\.: is a folder"):
         fresh(".", force=True)
 
 

@@ -131,12 +131,16 @@ def discover(
 
 
 def adopt(
-    answer: Discovered | str | Path, effect: str | None = None, out: str | Path = "model.yaml"
+    answer: Discovered | str | Path,
+    effect: str | None = None,
+    out: str | Path = "model.yaml",
+    *,
+    force: bool = False,
 ) -> Path:
     """Write the model with what an answer found, or with another `effect` of its ranking.
 
     `answer`: what `discover` gave, or its folder. Raises KembaError where nothing was found or
-    written, or `out` exists.
+    written, or `out` exists and not `force`.
     """
     from kemba.folders import YAML, fresh
     from kemba.identify.adopt import adopt_answer, adopt_effect
@@ -145,7 +149,7 @@ def adopt(
     if folder is None:
         hint = 'kemba.discover(logs, out="answer")'
         raise KembaError("the answer", "was not written to a folder", hint=hint)
-    path = fresh(out, endings=YAML)
+    path = fresh(out, force, endings=YAML)
     if effect is None:
         adopt_answer(folder, path)
     else:
@@ -185,14 +189,16 @@ def learn(
     columns: str | Path | None = None,
     time_limit: float = 600.0,
     correct: bool = True,
+    force: bool = False,
     progress: Tell | None = None,
     **changes: Any,
 ) -> Learned:
     """Learn from executed `runs` and plan the next one, as `kemba-opt learn` does.
 
     `logs`, `holdout`, `columns`, `progress`: as of `discover`. `target`: the task to plan, that of
-    the last run by default; `changes` are those of `--set`; `out`: its run folder. `correct`: plan
-    by what executions did beyond the learnt model too. `time_limit` in s. Raises KembaError.
+    the last run by default; `changes` are those of `--set`; `out`: its run folder, where `force`
+    replaces a finished run. `correct`: plan by what executions did beyond the learnt model too.
+    `time_limit` in s. Raises KembaError.
     """
     from kemba.rounds.round import Asked, learn_into
     from kemba.runs import load_run
@@ -202,7 +208,7 @@ def learn(
     task = target or load_run(folders[-1]).task
     told = settings(changes), _listed(holdout), columns, time_limit, correct
     asked = Asked(folders, _listed(logs), task, *told)
-    found, folder = learn_into(asked, out, Listener(progress or watched()))
+    found, folder = learn_into(asked, out, Listener(progress or watched()), force)
     return Learned(found, Planned.read(folder.path))
 
 

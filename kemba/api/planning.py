@@ -155,6 +155,7 @@ def plan(
     replay: bool = True,
     cold: bool = False,
     memory: bool = True,
+    force: bool = False,
     progress: Tell | None = None,
     **changes: Any,
 ) -> Planned:
@@ -164,7 +165,8 @@ def plan(
     `model`: instead of the task's. `changes` are those of `--set`: `height` is that of the body's
     centre (at 0.45 m the feet rise 1 cm), `feet` that of the feet. `starts`: guesses to try, the
     best plan is kept. `replay`: execute it in simulation. `cold`: begin from a guess, also where an
-    earlier plan of yours is near; `memory`: whether such plans are looked up, and this one listed.
+    earlier plan of yours is near; `memory`: whether such plans are looked up, and this one listed;
+    `force`: replace a finished run in `out`.
     `progress` gets the name of every stage; by default notebooks and terminals show them. Raises
     KembaError for mistakes; a task that cannot be met is none, the certificate says why.
     """
@@ -178,7 +180,7 @@ def plan(
     if not isinstance(task, Task):
         models.insert(0, find_config(task, "tasks"))
     files = [*dict.fromkeys(models), *BY_KIND.files]
-    folder = RunFolder.create(out, resolved.name, files, ["kemba.plan"])
+    folder = RunFolder.create(out, resolved.name, files, ["kemba.plan"], force)
     approach = Approach(starts=starts, replay=replay, cold=cold, memory=memory)
     listener = Listener(progress or watched())
     answer = solve_into(folder, resolved, document, listener, approach, figure=False)

@@ -81,23 +81,23 @@ def draw_band(axes: Axes, band: Band, explained: str = "explained") -> None:
 
 @paper_style
 def plot_ladder(
-    steps: Sequence[str], fitted: Sequence[float], held_out: Sequence[float] | None = None
+    steps: Sequence[str], fitted: Sequence[float], unseen: Sequence[float], kept: str
 ) -> Figure:
-    """Error / noise as effects are added one after the other, the start model first."""
+    """Error / noise as effects are added one after the other, the start model first. `kept`: what
+    the errors `unseen` are of."""
     figure = paper_figure(0.3 * len(steps) + 0.75, 4.6)
     axes = figure.add_subplot()
     rungs = range(len(steps))
     axes.plot(fitted, rungs, "o-", ms=4, color=GREY, label="fitted runs", zorder=3)
-    if held_out is not None:
-        axes.plot(held_out, rungs, "s-", ms=4, color=BLUE, label="held-out runs", zorder=4)
-        for rung, number in enumerate(held_out):
-            axes.annotate(
-                f"{number:.2f}", (number, rung), (0, 5), textcoords="offset points",
-                ha="center", color=BLUE, fontsize=7, zorder=5,
-            )  # fmt: skip
+    axes.plot(unseen, rungs, "s-", ms=4, color=BLUE, label=kept, zorder=4)
+    for rung, number in enumerate(unseen):
+        axes.annotate(
+            f"{number:.2f}", (number, rung), (0, 5), textcoords="offset points",
+            ha="center", color=BLUE, fontsize=7, zorder=5,
+        )  # fmt: skip
     axes.axvline(1.0, color=INK, lw=0.8, ls=DASHES, label="noise", zorder=2)
     axes.set_xscale("log")
-    numbers = [*fitted, *(held_out if held_out is not None else ()), 1.0]
+    numbers = [*fitted, *unseen, 1.0]
     axes.set_xlim(min(numbers) / 1.3, max(numbers) * 1.3)
     low, high = axes.get_xlim()
     ticks = [t for t in (0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500) if low <= t <= high]

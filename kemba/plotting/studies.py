@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from kemba.identify.answer import HELD_OUT
 from kemba.identify.compare.compare import conditions
 from kemba.identify.discover import Discovery
 from kemba.identify.infer.linear import NULL, Hypothesis
@@ -45,7 +46,9 @@ def draw_discovery(found: Discovery, folder: Path) -> list[Path]:
     figures["missing_force"] = plot_explained(found)
     if len(found.answer.ladder) > 1:
         names, unseen = zip(*found.answer.ladder, strict=True)
-        figures["ladder"] = plot_ladder(names, found.fitted, unseen)
+        split = found.answer.split_by
+        kept = "held-out runs" if split == HELD_OUT else f"left-out {split}"
+        figures["ladder"] = plot_ladder(names, found.fitted, unseen, kept)
     return [save_figure(f, folder / f"{name}.png") for name, f in figures.items()]
 
 

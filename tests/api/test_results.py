@@ -81,6 +81,12 @@ def test_an_answer_without_a_folder_is_not_adopted(tmp_path: Path) -> None:
         kemba.adopt(Discovered(Answer("missing"), None), out=tmp_path / "model.yaml")
     with pytest.raises(KembaError, match=r"holds no answer\.json"):
         kemba.adopt(tmp_path, out=tmp_path / "model.yaml")
+    (tmp_path / "model.yaml").touch()
+    kept = r"model\.yaml: exists already; give another name, .* \(in Python: force=True\)"
+    with pytest.raises(KembaError, match=kept):
+        kemba.adopt(tmp_path, out=tmp_path / "model.yaml")
+    with pytest.raises(KembaError, match=r"holds no answer\.json"):
+        kemba.adopt(tmp_path, out=tmp_path / "model.yaml", force=True)
 
 
 def test_a_search_leaves_time_for_the_end_of_its_answer() -> None:

@@ -39,6 +39,22 @@ def test_unknown_verbs_and_options_are_wrong_usage() -> None:
     assert CliRunner().invoke(app, ["check", "--nope"]).exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("typed", "told"),
+    [
+        ("solve --hieght 0.5", "--hieght; a key of the task is changed by --set 'hieght=VALUE'"),
+        ("solve --statrs 3", "--statrs; did you mean --starts?"),
+        ("compare a.csv --modle plant", "--modle; did you mean --model?"),
+        ("check --zzz", "No such option: --zzz"),
+    ],
+)
+def test_of_unknown_options_only_a_near_one_is_named(typed: str, told: str) -> None:
+    done = CliRunner().invoke(app, typed.split(), env={"COLUMNS": "200"})
+    said = " ".join(done.stderr.replace("│", " ").split())
+    assert done.exit_code == 2 and told in said
+    assert "Possible options" not in said and ("did you mean" in said) == ("mean" in told)
+
+
 @pytest.mark.parametrize("verb", ["compare", "discover", "adopt", "map", "export", "check"])
 def test_a_missing_argument_is_answered_by_an_example(verb: str) -> None:
     done = CliRunner().invoke(app, [verb])

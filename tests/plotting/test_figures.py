@@ -101,10 +101,10 @@ def test_bands_show_estimate_and_explanation() -> None:
 
 
 def test_ladder_goes_down_effect_by_effect() -> None:
-    figure = plot_ladder(["planning", "supply_droop"], [8.0, 1.1], [9.0, 1.3])
+    figure = plot_ladder(["planning", "supply_droop"], [8.0, 1.1], [9.0, 1.3], "left-out runs")
     (axes,) = figure.axes
     names = [label.get_text() for label in axes.get_yticklabels()]
     assert names == ["planning", "+ supply_droop"]
     assert axes.yaxis_inverted()
-    assert axes.get_legend_handles_labels()[1] == ["fitted runs", "held-out runs", "noise"]
+    assert axes.get_legend_handles_labels()[1] == ["fitted runs", "left-out runs", "noise"]
     assert [text.get_text() for text in axes.texts] == ["9.00", "1.30"]
