@@ -42,6 +42,10 @@ LIBRARIES = {
         "d = [numpy.array(v) for v in json.load(open(p)).values()]",
     ),
     "mat": ("import scipy.io", "d = scipy.io.loadmat(p, squeeze_me=True)"),
+    "mat 7.3": (
+        "import h5py",
+        "f = h5py.File(p); d = [f[n][()].ravel() for n in f]",
+    ),
     "mf4": (
         "import asammdf",
         "f = asammdf.MDF(p); d = [f.get(c.name).samples for c in f.groups[0].channels]",
@@ -125,6 +129,19 @@ def _mat(log: Table, path: Path) -> None:
     from scipy.io import savemat
 
     savemat(path, log)
+
+
+def _mat73(log: Table, path: Path) -> None:
+    """HDF5 behind the header of MATLAB 7.3, as MATLAB writes vectors."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in log.items():
+            data = file.create_dataset(name, data=values[None, :])
+            data.attrs["MATLAB_class"] = np.bytes_("double")
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    with path.open("r+b") as stream:
+        stream.write(head)
 
 
 def _mf4(log: Table, path: Path) -> None:
@@ -219,9 +236,11 @@ def _sto(log: Table, path: Path) -> None:
 
 
 WRITERS: dict[str, Callable[[Table, Path], None]] = {
-    "csv": _csv, "parquet": _parquet, "npz": _npz, "json": _json, "mat": _mat, "mf4": _mf4,
-    "tdms": _tdms, "mcap": _mcap, "bag": _bag, "sto": _sto, "ulg": _ulg, "lvm": _lvm,
+    "csv": _csv, "parquet": _parquet, "npz": _npz, "json": _json, "mat": _mat,
+    "mat 7.3": _mat73, "mf4": _mf4, "tdms": _tdms, "mcap": _mcap, "bag": _bag, "sto": _sto,
+    "ulg": _ulg, "lvm": _lvm,
 }  # fmt: skip
+FILES = {"bag": "log_bag", "mat 7.3": "log73.mat"}  # others: log.ENDING
 
 
 def measured(path: Path, load: str, read: str, repeats: int) -> tuple[float, float]:
@@ -261,7 +280,7 @@ def rows(minutes: float, formats: list[str], repeats: int) -> Iterator[str]:
     yield "|---|---:|---:|---:|---:|---:|---:|"
     with tempfile.TemporaryDirectory() as folder:
         for ending in formats:
-            path = Path(folder) / ("log_bag" if ending == "bag" else f"log.{ending}")
+            path = Path(folder) / FILES.get(ending, f"log.{ending}")
             WRITERS[ending](log, path)
             load, read = LIBRARIES[ending]
             theirs = measured(path, load, read, repeats)
