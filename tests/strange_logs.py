@@ -104,6 +104,7 @@ UNITS = {  # ours -> how it is written, and how many of it one of ours is
     "N.m": [("Nm", 1.0), ("N.m", 1.0), ("Nm/10", 10.0), ("mNm", 1e3), ("N m", 1.0)],
 }
 DOTTED = ("words", "dotted", "topics", "french")  # names that take no unit as another word
+SAID = {"said": " in ", "norm": " / ", "word": " "}  # between a name and its unit
 PLAIN = {"m": UNITS["m"][:2], "rad": UNITS["rad"][:2], "N.m": [("Nm", 1.0)]}
 
 
@@ -126,7 +127,7 @@ def way(seed: int) -> Way:
     found = Way(
         seed,
         str(rng.choice(list(NAMES))),
-        str(rng.choice(["none", "square", "round", "tail", "below"])),
+        str(rng.choice(["none", "square", "round", "tail", "below", "said", "norm", "word"])),
         str(rng.choice(list(CLOCKS))),
         tuple(map(str, some)),
         str(rng.choice(list(FORMS))),
@@ -143,7 +144,7 @@ def written(found: Way, folder: Path) -> tuple[Path, Trajectory]:
     columns: dict[str, np.ndarray] = {}
     below: dict[str, str] = {}
     slow = set()
-    plain = found.units in ("none", "tail") or found.form in BARE
+    plain = found.units in ("none", "tail", "word") or found.form in BARE
     chosen = {
         unit: ways[rng.integers(len(ways))] for unit, ways in (PLAIN if plain else UNITS).items()
     }
@@ -154,6 +155,8 @@ def written(found: Way, folder: Path) -> tuple[Path, Trajectory]:
             label = f"{label} [{text}]"
         elif text and found.units == "round":
             label = f"{label} ({text})"
+        elif text and found.units in SAID and found.form not in BARE:
+            label = f"{label}{SAID[found.units]}{text}"
         elif text and (found.units == "tail" and found.names not in DOTTED) | (
             found.units == "below" and found.form in BARE
         ):

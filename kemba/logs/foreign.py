@@ -96,6 +96,9 @@ class _Reader:
         written = times.seconds(self.raw.columns[name]) if self._is_text(name) else None
         if written is not None:
             values = written
+            if source.add is not None:
+                parts = self._numbers(TIME, source.add.source)
+                values = values + self._converted(TIME, source.add, parts)
         else:
             self._check_texts(name)
             values = np.zeros(len(self.raw.columns[name]))

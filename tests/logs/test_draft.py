@@ -160,6 +160,39 @@ def test_a_drive_is_recognised(tmp_path: Path) -> None:
     assert list(draft.columns) == ["time [s]", "axis/q [m]", "axis/tau [N]"]
 
 
+@pytest.mark.parametrize("part", ["motor", "drive", "shaft"])
+def test_the_motor_of_a_drive_is_its_axis(part: str, tmp_path: Path) -> None:
+    t = np.arange(100) * 1e-3
+    table = {"t/s": t, f"{part} position [rev]": np.sin(9 * t), f"{part} torque/mNm": 300 * t}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    logged = {"axis/q": "rad", "axis/tau": "N.m"}
+    draft = draft_map(tmp_path / "log.csv", LEGS, rig="drive", logged=logged)
+    units = [source.get("unit") for source in draft.columns.values()]
+    assert not draft.missing and not draft.questions and units == [None, "rev", "mNm"]
+
+
+@pytest.mark.parametrize(
+    ("label", "told"),
+    [
+        ("force [N*10]", "multiplied by 10?"),
+        ("force_x100_N", "multiplied by 100?"),
+        ("force [N x 1e3]", "multiplied by 1e3?"),
+        ("force [N*0.1]", "multiplied by 0.1?"),
+        ("force", "no unit is told for 'force', at most 5e+04"),
+        ("force [0.1 N]", ""),
+        ("force_x1 [N]", ""),
+    ],
+)
+def test_a_factor_behind_a_unit_may_be_of_either(label: str, told: str, tmp_path: Path) -> None:
+    """Of the readings, as by `x1000` mostly, or of the unit: a person knows."""
+    t = np.arange(100) * 1e-3
+    table = {"time": t, "position [m]": np.sin(9 * t), label: 5e4 * np.cos(9 * t)}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    logged = {"axis/q": "m", "axis/tau": "N"}
+    asked = draft_map(tmp_path / "log.csv", LEGS, rig="drive", logged=logged).questions
+    assert told in " ".join(asked) and bool(asked) == bool(told)
+
+
 def test_valves_are_told_by_what_they_are_told_to_do(tmp_path: Path) -> None:
     """Of a command and its echo, the command counts."""
     t = np.arange(200) * 1e-3

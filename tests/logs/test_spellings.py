@@ -133,6 +133,15 @@ def test_valves_in_words(on: str, off: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(back[name], LOG[name])
 
 
+@pytest.mark.parametrize("word", ["closed", "inverted"])
+def test_a_valve_that_is_named_by_what_it_is_not_is_a_question(word: str, tmp_path: Path) -> None:
+    frame = table().rename(columns={"front_valve_extend": f"front_valve_extend_{word}"})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", LEGS, 0.07)
+    assert [text.split(":")[0] for text in draft.questions] == ["front/valve/extend [1]"]
+    assert "`threshold: 0.5, sign: -1`" in draft.questions[0]
+
+
 def test_a_valve_of_unknown_words_is_not_taken(tmp_path: Path) -> None:
     words = {"front_valve_extend": np.where(LOG["front/valve/extend"] > 0.5, "Extend", "Off")}
     table(**words).to_csv(tmp_path / "log.csv", index=False)
@@ -166,6 +175,21 @@ def test_encodings(coded: str, tmp_path: Path) -> None:
     columns = {"time [s]": {"source": label}, "body/z [m]": {"source": "body_z"}}
     back = read_log(tmp_path / "log.csv", ColumnMap(columns=columns))
     np.testing.assert_allclose(back["body/z"], LOG["body/z"])
+
+
+@pytest.mark.parametrize(("part", "size"), [("ms", 1e3), ("Milliseconds", 1e3), ("usec", 1e6)])
+def test_what_is_below_a_second_may_stand_beside_a_clock(
+    part: str, size: float, tmp_path: Path
+) -> None:
+    began = pd.Timestamp("2026-11-30 23:59:59.8").value
+    stamps = pd.to_datetime(began + np.round(1e9 * LOG.time).astype(np.int64))
+    clock = {"Date": stamps.strftime("%d.%m.%Y"), "Time": stamps.strftime("%H:%M:%S")}
+    below = np.round(size * (stamps.microsecond.to_numpy() / 1e6)).astype(int)
+    frame = table().drop(columns="time").assign(**clock, **{part: below})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    draft, back = read(tmp_path / "log.csv")
+    assert not draft.missing and not draft.questions
+    np.testing.assert_allclose(back.time - back.time[0], LOG.time, atol=1e-6)
 
 
 @pytest.mark.parametrize("remark", ["", "# trigger\n"])

@@ -60,3 +60,28 @@ def test_beside_a_known_unit_nothing_is_strange(name: str) -> None:
 
 def test_a_unit_inside_a_name_is_taken_where_there_is_one() -> None:
     assert named_unit("pos_mm_front") == ("pos_front", "mm")
+
+
+@pytest.mark.parametrize(
+    ("name", "bare", "unit"),
+    [
+        ("Kraft in kN", "Kraft", "kN"), ("v / mm/s", "v", "mm/s"), ("Force, kN", "Force", "kN"),
+        ("Force - kN", "Force", "kN"), ("F/kN", "F", "kN"), ("t/s", "t", "s"),
+        ("Winkel/°", "Winkel", "deg"), ("Force kN", "Force", "kN"), ("Time:s", "Time", "s"),
+        ("pos.mm", "pos", "mm"), ("Force <kN>", "Force", "kN"), ("Force {kN}", "Force", "kN"),
+        ("positionMm", "position", "mm"), ("forceKN", "force", "kN"), ("hipDeg", "hip", "deg"),
+        ("TORQUE_MNM", "TORQUE", "mN.m"), ("torque [ft-lb]", "torque", "lbf.ft"),
+    ],
+)  # fmt: skip
+def test_a_unit_stands_behind_a_name_in_any_way(name: str, bare: str, unit: str) -> None:
+    assert named_unit(name) == (bare, unit)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["front/hip/q", "body/z", "/robot/m", "robot/leg/N", "valve_front_in", "valve front in",
+     "Pressure min", "hip V", "joint.m", "Piston, front", "body / z", "rod in 1", "cylPosR",
+     "Force - foot"],
+)  # fmt: skip
+def test_a_path_a_side_or_a_letter_is_no_unit(name: str) -> None:
+    assert named_unit(name) == (name, None)

@@ -193,7 +193,8 @@ def joint_state_labels(raw: Raw) -> dict[str, str]:
 
 
 def _candidates(raw: Raw, values: Mapping[str, Array], names: Names) -> list[Clock]:
-    found = _pairs(values)
+    texts = {n: times.seconds(c) for n, c in raw.items() if n not in values and c.dtype == object}
+    found = _pairs(values, {name: read for name, read in texts.items() if read is not None})
     parts = {name for pair in found for name in pair.names}
     rest = [name for name in raw if name not in parts]
     found += [c for name in rest if (c := _single(name, raw, values, names)) is not None]
@@ -268,19 +269,22 @@ def _called(name: str, rows: Array, stated: str | None, names: Names) -> tuple[f
     return UNNAMED, f"no column is called a time: '{name}' is the one that rises"
 
 
-def _pairs(values: Mapping[str, Array]) -> list[Clock]:
-    """Whole seconds and what is below them, in columns of one path."""
+def _pairs(values: Mapping[str, Array], texts: Mapping[str, Array]) -> list[Clock]:
+    """Whole seconds and what is below them, in columns of one path; also of `texts` that were read
+    as times (n,)."""
     found = []
-    for name in values:
+    every = {**values, **texts}
+    for name in every:
         head, tail = _split(name)
-        if tail not in SECONDS:
+        if tail not in SECONDS and name not in texts:
             continue
         for other in values:
             path, part = _split(other)
             unit = next((u for u, known in PARTS.items() if part in known), None)
-            if path == head and unit is not None and _whole(values[name], values[other], unit):
+            near = not path or says_time(path) if name in texts else path == head
+            if near and unit is not None and _whole(every[name], values[other], unit):
                 score = NAMED + 1 if not head or head.count("/") < 2 else NAMED - 1
-                found.append(_pair(values, name, other, unit, score))
+                found.append(_pair(every, name, other, unit, score))
     return found
 
 

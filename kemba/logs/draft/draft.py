@@ -33,6 +33,8 @@ from kemba.logs.draft.matching import (
 )
 from kemba.logs.draft.sizes import guessed_units
 from kemba.logs.draft.words import (
+    FACTOR,
+    NEGATED,
     WORDS,
     Names,
     is_unit,
@@ -333,6 +335,12 @@ def _asked(target: Target, name: str, names: Names) -> list[str]:
     strange = strange_unit(written, names.legs) or strange_unit(stated, names.legs)
     if strange and names.unit(name) is None and not target.is_valve:
         found.append(f"{target.header}: '{name}' is in '{strange}', which is no unit that is known")
+    if (factor := FACTOR.search(written + stated)) and not target.is_valve:
+        asked = f"were the readings of '{name}' multiplied by {factor[0].strip('*x×· ')}?"
+        found.append(f"{target.header}: {asked} Then give their unit and `scale`")
+    if target.is_valve and NEGATED & {*words(names.bare(name))}:
+        asked = f"is '{name}' 1 where nothing is asked for? Then `threshold: 0.5, sign: -1`"
+        found.append(f"{target.header}: {asked}")
     if target.header.endswith("piston/x [m]") and names.unit(name) is None:
         said = set(words(names.bare(name)))
         if "knee" in said and not said & PISTONS:

@@ -18,7 +18,8 @@ class Target:
     """One of our columns.
 
     `means`: what a foreign name must say, group by group; only that a position is one may go
-    unsaid. `may`: what it may say as well; anything else in the same group speaks against it.
+    unsaid. `may`: what it may say as well, one of several words; anything else in the
+    same group speaks against it.
     """
 
     header: str
@@ -89,7 +90,7 @@ def rig_targets(logged: Mapping[str, str]) -> list[Target]:
 
 def drive_targets(rotary: bool) -> list[Target]:
     """The columns of a drive: one axis, a force or a torque."""
-    may = {"part": "axis"}
+    may = {"part": "axis hip"}  # `motor` is a word for both
     if rotary:
         turning = {**may, "direction": "pitch"}
         return [
@@ -301,7 +302,7 @@ def agreement(says: Meaning, target: Target) -> float:
     score /= len(target.means)
     for group, found in says.items():
         if group in target.may:
-            if target.may[group] not in found:
+            if not found & {*target.may[group].split()}:
                 return NOTHING
             score += SAID_TOO * (target.may[group] != "position")
         elif group not in target.means:

@@ -92,6 +92,9 @@ SPELT = {
     "dps": "deg/s", "mps": "m/s", "meters": "m", "metres": "m", "seconds": "s", "newton": "N",
     "C": "degC", "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "mm_s": "mm/s", "m_s2": "m/s2",
     "Nmm": "N.mm", "kgfm": "kgf.m", "kgf-m": "kgf.m", "lbft": "lbf.ft", "cNm": "cN.m",
+    "mdeg": "deg/1000", "daN": "N*10", "oz-in": "ozf.in",
+    **dict.fromkeys("ft-lb ft-lbs ft-lbf lb-ft lbf-ft".split(), "lbf.ft"),
+    **dict.fromkeys("in-lb in-lbs in-lbf lb-in lbf-in".split(), "lbf.in"),
     **dict.fromkeys("millimeter millimetre millimeters millimetres".split(), "mm"),
     **dict.fromkeys("centimeter centimetre centimeters centimetres".split(), "cm"),
     **dict.fromkeys(("newtonmeter", "newtonmetre", "newton meters", "newton metres"), "N.m"),
@@ -103,18 +106,28 @@ PRESSURE = re.compile(
 )
 AIR = {True: frozenset("gauge g rel relative relativ relativdruck ü überdruck".split()),
        False: frozenset("abs absolute absolut absolutdruck a".split())}  # fmt: skip
-CAPITALS = {u.upper(): u for u in "mm cm um ms deg rad bar psi kPa MPa".split()} | {"NM": "N.m"}
+CAPITALS = {
+    u.upper(): SPELT.get(u, u)
+    for u in "mm cm um us ms deg mdeg rad mrad bar mbar psi kPa MPa kN".split()
+} | {"NM": "N.m", "MNM": "mN.m"}
 UNITS = (
     "ns us µs ms s min um mm cm m in ft deg rad mrad rev turns gon bar mbar kPa MPa Pa psi kN N "
     "kgf lbf Nm N.m mN.m mNm mV V K degC"
 ).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
 SWITCHED = frozenset("extend retract ausfahren einfahren".split())  # what valves are told to do
+NEGATED = frozenset("closed inverted inv negated not geschlossen zu".split())
 COUNTED = frozenset("counts cnt ticks pulses adc lsb".split())  # what a converter gave, no unit
 # of minutes, inches, per mille, and factors alone: `[1/100]`
 UNIT_MARK = re.compile(r"['\"′″‰]+|[\d\s.]*[/^]\s*-?\d+")
+# of a number by which a reading may have been multiplied, or its unit: `[m*1000]`, `pos_x100`
+FACTOR = re.compile(r"[*×·] ?\d[\d.e]*|(?<![^\W_])x ?(?:10+|1e\d)(?![^\W_])")
 LEGS_IN_BRACKETS = frozenset("L R F B H A".split())  # `(L)` is the left one, not litres
-BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))")
+BRACKETS = re.compile(r"\s*(?:\[([^\[\]]*)\]|[({<]([^(){}<>]*)[)}>])")
+BEFORE_ANY = (" in ", " / ", ", ", " - ")  # marks before a unit: `Kraft in kN`, `v / mm/s`
+BEFORE_USUAL = (" ", "/", ",", ":", ".")  # before one of the usual: `Weg mm`, `F/kN`, `pos.mm`
+CAMEL = re.compile(r"(.*[a-z\d])([A-Z][A-Za-z]+)")  # `positionMm`
+FLOWS = "valve valves vlv sol solenoid pressure press p"  # what goes `in`, not in inches
 WORD = re.compile(r"[A-Z]?(?:[^\W\d_A-Z]|°)+|[A-Z]+(?![a-z])|\d+")
 AXES = frozenset("xyz")
 Meaning = dict[str, set[str]]
@@ -219,8 +232,8 @@ def _vocabulary() -> frozenset[str]:
 
 
 def named_unit(name: str) -> tuple[str, str | None]:
-    """A column's name without its unit, and the unit: of `pos [mm]`, `pos (mm)` or `pos_mm`. What
-    stands in brackets and is no unit belongs to the name."""
+    """A column's name without its unit, and the unit: of `pos [mm]`, `pos (mm)`, `pos_mm`,
+    `pos in mm`, `pos/mm`, `posMm`. What stands there and is no unit belongs to the name."""
     for match in reversed(list(BRACKETS.finditer(name))):
         square = match[1] is not None
         text = (match[1] if square else match[2]).strip()
@@ -228,19 +241,34 @@ def named_unit(name: str) -> tuple[str, str | None]:
         spaced = match[0][:1] == " "
         if is_unit(unit, indexed=not spaced) and (square or unit not in LEGS_IN_BRACKETS):
             return (name[: match.start()] + name[match.end() :]).strip(), unit
+    for mark in BEFORE_ANY:
+        head, _, tail = name.rpartition(mark)
+        strange = len(tail) == 1 or tail.lower() in ("foot", "feet")
+        if head and (tail in UNITS or (not strange and is_unit(spelt(tail), indexed=True))):
+            return head.strip(), spelt(tail)
     pieces = name.split("_")
     for width in (2, 1):
-        tail = "_".join(pieces[-width:])
-        if (
-            len(pieces) > width
-            and pieces[0]
-            and (spelt(tail) != tail or (width == 1 and tail in UNITS))
-        ):
-            return "_".join(pieces[:-width]), spelt(tail)
+        head, tail = "_".join(pieces[:-width]), "_".join(pieces[-width:])
+        if head and pieces[0] and (spelt(tail) != tail or (width == 1 and _is_usual(head, tail))):
+            return head, spelt(tail)
+    for mark in BEFORE_USUAL:
+        head, _, tail = map(str.strip, name.rpartition(mark))
+        short = len(tail) == 1 and (mark == "." or tail not in "smN°")
+        path = mark == "/" and ("/" in head or not head)
+        known = spelt(tail) != tail or tail in UNITS
+        if head and known and not (short or path or tail in ("in", "min")):
+            return head, spelt(tail)
+    if (camel := CAMEL.fullmatch(name)) and camel[2].upper() in CAPITALS:
+        return camel[1], CAPITALS[camel[2].upper()]
     inside = [piece for piece in pieces[1:] if piece in INSIDE]
     if len(inside) == 1:
         return "_".join(piece for piece in pieces if piece != inside[0]), inside[0]
     return name, None
+
+
+def _is_usual(head: str, tail: str) -> bool:
+    """Whether what stands behind a name is a usual unit, and no `valve_in`."""
+    return tail in UNITS and not (tail == "in" and set(words(head)) & set(FLOWS.split()))
 
 
 def is_unit(text: str, indexed: bool = False) -> bool:
