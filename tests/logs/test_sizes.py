@@ -92,7 +92,7 @@ def test_sizes_tell_units(
 @pytest.mark.parametrize(
     ("rig", "logged", "columns", "asked"),
     [
-        ("drive", {"axis/q": "m", "axis/tau": "N"}, {"position": 6.7, "force": 3.0}, "in, but"),
+        ("drive", {"axis/q": "m", "axis/tau": "N"}, {"position": 6.7, "force": 30.0}, "in, but"),
         ("vessel", {"vessel/P": "Pa", "vessel/T": "K"}, {"tank pressure": 7e5, "temp": 68.0},
          "degF, but"),
     ],
@@ -106,6 +106,23 @@ def test_inches_and_fahrenheit_are_asked_about(
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
     (question,) = draft_map(tmp_path / "log.csv", (), None, rig, logged).questions
     assert f"taken as {asked} may be" in question
+
+
+@pytest.mark.parametrize(
+    ("size", "unit", "asked"),
+    [(60.0, None, False), (0.06, "kN", False), (3.0, "kN", True), (6e4, None, True)],
+)
+def test_a_force_without_a_unit_is_told_by_its_size(
+    size: float, unit: str | None, asked: bool, tmp_path: Path
+) -> None:
+    """Of a rod: 0.06 is in kN, 3 may be, 60 000 is in no usual one."""
+    time = np.linspace(0.0, 4.0, 400)
+    table = {"t": time, "rod x [mm]": 30 * np.sin(time), "rod force": size * np.cos(time)}
+    table |= {f"valve {side}": (time * 7 % 2 < 1).astype(float) for side in ("extend", "retract")}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    draft = draft_map(tmp_path / "log.csv", ())
+    assert draft.columns["piston/F [N]"].get("unit") == unit
+    assert bool(draft.questions) is asked
 
 
 @pytest.mark.parametrize("unit", ["lbf", "kgf", "mNm", "um", "rev", "ft", "K"])

@@ -70,6 +70,7 @@ def test_a_unit_inside_a_name_is_taken_where_there_is_one() -> None:
         ("Winkel/°", "Winkel", "deg"), ("Force kN", "Force", "kN"), ("Time:s", "Time", "s"),
         ("pos.mm", "pos", "mm"), ("Force <kN>", "Force", "kN"), ("Force {kN}", "Force", "kN"),
         ("positionMm", "position", "mm"), ("forceKN", "force", "kN"), ("hipDeg", "hip", "deg"),
+        ("p_kgf/cm2", "p", "kgf/cm2"), ("force/mN", "force", "mN"),
         ("TORQUE_MNM", "TORQUE", "mN.m"), ("torque [ft-lb]", "torque", "lbf.ft"),
     ],
 )  # fmt: skip

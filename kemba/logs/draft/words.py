@@ -111,7 +111,7 @@ CAPITALS = {
     for u in "mm cm um us ms deg mdeg rad mrad bar mbar psi kPa MPa kN".split()
 } | {"NM": "N.m", "MNM": "mN.m"}
 UNITS = (
-    "ns us µs ms s min um mm cm m in ft deg rad mrad rev turns gon bar mbar kPa MPa Pa psi kN N "
+    "ns us µs ms s min um mm cm m in ft deg rad mrad rev turns gon bar mbar kPa MPa Pa psi kN N mN "
     "kgf lbf Nm N.m mN.m mNm mV V K degC"
 ).split()
 INSIDE = frozenset("mm cm deg rad mrad bar mbar kPa MPa Pa psi kN Nm".split())
@@ -267,8 +267,9 @@ def named_unit(name: str) -> tuple[str, str | None]:
 
 
 def _is_usual(head: str, tail: str) -> bool:
-    """Whether what stands behind a name is a usual unit, and no `valve_in`."""
-    return tail in UNITS and not (tail == "in" and set(words(head)) & set(FLOWS.split()))
+    """Whether what stands behind a name is a usual unit or a rate of units, and no `valve_in`."""
+    rate = "/" in tail and is_unit(tail)
+    return (rate or tail in UNITS) and not (tail == "in" and set(words(head)) & set(FLOWS.split()))
 
 
 def is_unit(text: str, indexed: bool = False) -> bool:
