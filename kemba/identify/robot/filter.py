@@ -222,12 +222,12 @@ def expected_power(system: System, gain: FilterGains) -> Array:
     """Mean square (n, L, m) of the whitened innovations that sensor noise alone makes.
 
     It is below 1 where the filter allows for contact forces that a steady stance does not need.
-    The draws are few, so that their power is averaged over some nodes.
+    The draws are few, so that their power is averaged over some nodes, those with a measurement.
     """
-    rng = np.random.default_rng(0)
-    y = simulated(system, DRAWS, rng)
-    power = np.mean(innovations(system, gain, y, None) ** 2, axis=-1)
-    return np.asarray(np.maximum(uniform_filter1d(power, WIDTH, 0, mode="nearest"), LEAST))
+    y, known = simulated(system, DRAWS, np.random.default_rng(0)), np.isfinite(system.R)
+    power = np.where(known, np.mean(innovations(system, gain, y, None) ** 2, axis=-1), 0.0)
+    power, share = (uniform_filter1d(v, WIDTH, 0, float, "nearest") for v in (power, known))
+    return np.asarray(np.maximum(power / np.maximum(share, 1.0 / WIDTH), LEAST))
 
 
 def predicted_error(system: System, y: Array, g: Array, steps: int) -> Array:

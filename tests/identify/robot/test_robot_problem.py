@@ -67,6 +67,22 @@ def test_a_right_model_leaves_white_noise(clean: RobotProblem) -> None:
         assert abs(echo) < 0.3, channel
 
 
+@pytest.mark.parametrize("every", [2, 10])
+def test_a_slow_channel_is_as_noisy_as_a_fast_one(every: int) -> None:
+    """Rows without its readings have no part in the noise that is expected of it."""
+    log = hops(runs=1)[0][0]
+    columns = {}
+    for name in log.names:
+        left = log[name].copy()
+        if name.startswith("body/"):
+            left[np.arange(len(left)) % every != 0] = np.nan
+        columns[f"{name} [{log.unit(name)}]"] = left
+    slow = robot_problem([Trajectory(log.time, columns, log.meta)], load_model("planning"))
+    rows, r = slow.rows(), slow.residual({}) / np.sqrt(slow.expected_power())
+    for k in (0, 1, 2):
+        assert 0.75 < np.sqrt(np.mean(r[rows.channel == k] ** 2)) < 1.35
+
+
 def test_the_reference_follows_the_motion(clean: RobotProblem) -> None:
     y, seen = clean.state.motion.y, clean.batch.y
     error = np.sqrt(np.nanmean((y - seen) ** 2, axis=(0, 1)))
