@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -112,6 +113,7 @@ def discover(
     *,
     columns: str | Path | None = None,
     out: str | Path | None = None,
+    force: bool = False,
     time_limit: float = 300.0,
     progress: Tell | None = None,
 ) -> Discovered:
@@ -119,14 +121,15 @@ def discover(
 
     `logs`: of one machine; `holdout`: logs kept for judging. `out`: folder for answer.json and
     model.yaml; nothing is written without it. `time_limit` in s. `columns`, `progress`: as of
-    `compare`. Raises KembaError for files that cannot be read.
+    `compare`. Raises KembaError for files that cannot be read, or where `out` holds an answer and
+    not `force`.
     """
+    from kemba.folders import claimed
     from kemba.identify.workflow import discover_logs
 
-    tell = progress or watched()
-    found = discover_logs(
-        _listed(logs), _listed(holdout), str(model), columns, time_limit, tell, out
-    )
+    tell, told = progress or watched(), (_listed(logs), _listed(holdout), str(model), columns)
+    with nullcontext() if out is None else claimed(out, out, "answer.json", force):
+        found = discover_logs(*told, time_limit, tell, out)
     return Discovered(*found, None if out is None else Path(out))
 
 

@@ -78,6 +78,11 @@ def test_discover_says_why_data_are_bad(tmp_path: Path) -> None:
     with pytest.raises(KembaError, match="not fitted"):
         found.figure()
     assert "<img" not in found._repr_html_()
+    out = tmp_path / "answer"
+    kemba.discover(tmp_path / "a.csv", out=out)
+    with pytest.raises(KembaError, match="holds results already"):
+        kemba.discover(tmp_path / "a.csv", out=out)
+    kemba.discover(tmp_path / "a.csv", out=out, force=True)
 
 
 def test_tasks_and_models_load_by_name() -> None:
