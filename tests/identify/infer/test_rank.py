@@ -52,7 +52,7 @@ def test_the_figure_of_an_answer_does_not_depend_on_what_is_refitted_later() -> 
     found = discover(Toy({"kick.a": -9.0, "wave.a": 7.0}))
     del found.search.points["kick",]
     steps, unseen = zip(*found.answer.ladder, strict=True)
-    plot_ladder(steps, found.fitted, unseen)
+    plot_ladder(steps, found.fitted, unseen, "held-out runs")
     assert len(found.fitted) == len(found.answer.ladder)
 
 
