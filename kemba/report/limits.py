@@ -280,7 +280,7 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
         rows.append(
             [
                 escape(track.name),
-                ", ".join(f"{z:.3f} m at {time:.3f} s" for time, z in tops),
+                ", ".join(f"{z:.3f} m at {round(time, 3) + 0.0:.3f} s" for time, z in tops),  # no -0
                 _or_dash(e.feet, 100, "cm"),
                 _times(e.lift_offs),
                 *(_touchdown(e, leg) for leg in legs),
