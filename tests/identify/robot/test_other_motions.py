@@ -1,27 +1,36 @@
-"""Logs of a bound and of a jump onto a platform: contacts come from their scene."""
+"""Logs of a bound and of a jump on a slope: contacts come from their scene."""
 
 from pathlib import Path
 
 import pytest
 
 import kemba
+from kemba.config import shipped_configs
 
 pytestmark = pytest.mark.nightly
 
 HIDDEN = {"hip_friction": ("T_c", 0.6), "hose_lag": ("T", 0.008)}
 
 
-CHANGES = {"bound": {}, "platform": {"terrain.0.height": "0.1 m"}}
+def bound() -> str:
+    return shipped_configs("tasks")["bound.yaml"].read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module", params=CHANGES)
+def slope() -> str:
+    level = shipped_configs("tasks")["jump.yaml"].read_text(encoding="utf-8")
+    turned = level.replace("foot/z", "foot/gap").replace("body/pitch: 0 deg", "body/pitch: 8 deg")
+    return f"{turned}terrain:\n  - {{slope: 8 deg}}\n"
+
+
+@pytest.fixture(scope="module", params=(bound, slope))
 def planned(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plan as the grid has it: what is learnt from is the executions."""
-    folder = tmp_path_factory.mktemp(request.param) / "run"
-    grid = {"refine": "none", "nodes": 60, **CHANGES[request.param]}
-    made = kemba.plan(f"{request.param}.yaml", folder, replay=False, memory=False, **grid)
+    folder = tmp_path_factory.mktemp(request.param.__name__)
+    task = folder / "task.yaml"
+    task.write_text(request.param(), encoding="utf-8")
+    made = kemba.plan(task, folder / "run", replay=False, memory=False, refine="none", nodes=60)
     assert made.certificate["status"] == "solved", made.sentence
-    return folder
+    return folder / "run"
 
 
 @pytest.mark.parametrize("kind", HIDDEN)
