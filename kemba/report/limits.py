@@ -276,11 +276,12 @@ def event_table(tracks: Sequence[Track], events: Sequence[Events | None]) -> str
     for track, e in zip(tracks, events, strict=True):
         if e is None:
             continue
-        tops = e.apexes if len(e.apexes) > 1 else [(e.apex_time, e.apex)]
+        found = e.apexes if len(e.apexes) > 1 else [(e.apex_time, e.apex)]
+        tops = [(round(time, 3) + 0.0, z) for time, z in found]  # without -0.000
         rows.append(
             [
                 escape(track.name),
-                ", ".join(f"{z:.3f} m at {round(time, 3) + 0.0:.3f} s" for time, z in tops),  # no -0
+                ", ".join(f"{z:.3f} m at {time:.3f} s" for time, z in tops),
                 _or_dash(e.feet, 100, "cm"),
                 _times(e.lift_offs),
                 *(_touchdown(e, leg) for leg in legs),
