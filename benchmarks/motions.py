@@ -14,6 +14,7 @@ import argparse
 import os
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -127,7 +128,9 @@ def page(rows: Iterable[dict[str, Any]], motions: Iterable[str]) -> list[str]:
             cells = [robot, f"`{row['motion']}`", *told, cost, f"{row['cpu']:.0f}"]
             lines.append(f"| {' | '.join(cells)} |")
     good = sum(bool(row.get("good")) for row in known.values())
-    return [*lines, "", f"Good: {good} of {len(known)}. On {machine()}."]
+    on = Counter(row["machine"] for row in known.values())
+    told = ", ".join(f"{name} ({count} rows)" for name, count in on.items())
+    return [*lines, "", f"Good: {good} of {len(known)}. On {told}."]
 
 
 def main() -> None:
@@ -148,7 +151,8 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             file = written(motion, robot, Path(folder))
             found = answered(file, asked.limit)
-        record.add({"robot": robot, "motion": motion, "limit": asked.limit, **found})
+        told = {"robot": robot, "motion": motion, "limit": asked.limit, "machine": machine()}
+        record.add(told | found)
     record.show(page(record.rows, motions), asked.save, BEGIN, END)
 
 

@@ -1,4 +1,4 @@
-"""Logs of a bound and of a jump on a slope: contacts come from their scene."""
+"""Logs of a bound, and of jumps on a slope and across a step: contacts come from their scene."""
 
 from pathlib import Path
 
@@ -17,12 +17,24 @@ def bound() -> str:
 
 
 def slope() -> str:
-    level = shipped_configs("tasks")["jump.yaml"].read_text(encoding="utf-8")
-    turned = level.replace("foot/z", "foot/gap").replace("body/pitch: 0 deg", "body/pitch: 8 deg")
-    return f"{turned}terrain:\n  - {{slope: 8 deg}}\n"
+    return jump("8 deg") + "terrain: [{slope: 8 deg}]\n"
 
 
-@pytest.fixture(scope="module", params=(bound, slope))
+def step() -> str:
+    """The front feet stand on a platform, whose edge is a wall between the legs."""
+    return jump("5.5 deg") + "terrain: [{from: 0 m, height: 5 cm}]\n"
+
+
+def jump(pitch: str) -> str:
+    text = shipped_configs("tasks")["jump.yaml"].read_text(encoding="utf-8")
+    changes = {"body/pitch: 0 deg": f"body/pitch: {pitch}", "at_least: 5 cm": "at_least: 2 cm"}
+    changes |= {f"{point}/z": f"{point}/gap" for point in ("foot", "knee", "hip")}
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    return text
+
+
+@pytest.fixture(scope="module", params=(bound, slope, step))
 def planned(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A plan as the grid has it: what is learnt from is the executions."""
     folder = tmp_path_factory.mktemp(request.param.__name__)
