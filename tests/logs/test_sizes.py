@@ -93,14 +93,17 @@ def test_sizes_tell_units(
     ("rig", "logged", "columns", "asked"),
     [
         ("drive", {"axis/q": "m", "axis/tau": "N"}, {"position": 6.7, "force": 30.0}, "in, but"),
+        ("drive", {"axis/q": "rad", "axis/tau": "N.m"}, {"position": 2.0, "torque": 120.0},
+         "N.m, but"),
         ("vessel", {"vessel/P": "Pa", "vessel/T": "K"}, {"tank pressure": 7e5, "temp": 68.0},
          "degF, but"),
     ],
 )  # fmt: skip
-def test_inches_and_fahrenheit_are_asked_about(
+def test_what_other_units_are_usual_too_is_asked_about(
     rig: str, logged: dict[str, str], columns: dict[str, float], asked: str, tmp_path: Path
 ) -> None:
-    """Beside centimetres and Celsius, in which the same numbers are usual too."""
+    """Inches beside centimetres, Fahrenheit beside Celsius, the torque of a small drive in mN.m
+    beside that of a large one."""
     time = np.linspace(0.0, 4.0, 400)
     table = {"time": time, **{name: size * np.cos(0.3 * time) for name, size in columns.items()}}
     pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
