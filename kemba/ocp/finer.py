@@ -19,6 +19,7 @@ from kemba.ocp.planner import Planner, searched
 from kemba.ocp.refinement import refine
 from kemba.ocp.refinement.refine import Refined
 from kemba.ocp.relaxation.session import Attempt
+from kemba.ocp.sides import on_level_ground
 
 TORQUE = "torque_squared_integral"
 
@@ -152,8 +153,14 @@ def found_and_refined(planner: Planner, refused: bool, new: Judge) -> Plan | Non
 
 
 def _sought(planner: Planner, refused: bool) -> Plan:
-    """A plan from the guess, on the model on which plans are sought."""
+    """A plan from the guess, on the model on which plans are sought; in a scene with walls on level
+    ground first."""
     seeker = planner.seeking
+    level = None if refused or planner.start is not None else on_level_ground(seeker)
+    if level is not None:
+        found = searched(level, refused)
+        if found.status.plan or planner.session.control.ended():
+            return found
     found = searched(seeker, refused)
     planner.outcome = seeker.outcome
     return found

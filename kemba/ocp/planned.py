@@ -87,11 +87,12 @@ class Plan:
 
 
 def judge(
-    requirements: Sequence[Requirement], transcription: Transcription, point: Iterate
+    model: Model, requirements: Sequence[Requirement], transcription: Transcription, point: Iterate
 ) -> Plan:
-    """Certificate, status and sentence of what was found; `requirements` are all of the task's."""
-    task, model = transcription.task, transcription.model
-    trajectory = to_trajectory(transcription, point.Y)
+    """Certificate, status and sentence of what was found; `requirements` are all of the task's on
+    its `model`, of which the program may have another scene."""
+    task, other = transcription.task, model is not transcription.model
+    trajectory = to_trajectory(transcription, point.Y, model if other else None)
     # `grip` comes last, on the refined plan
     certificate = certify(model, task.model_copy(update={"grip": 1.0}), requirements, trajectory)
     size = transcription.variables, transcription.constraints

@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
+import numpy as np
+
 from kemba.model import Model
 from kemba.ocp.infeasibility.elastic import Outcome, elastic
 from kemba.ocp.nlp.ending import Ending
@@ -22,13 +24,16 @@ from kemba.ocp.relaxation.schedule import (
     grow,
     penalise,
     refine_grid,
+    relax_stepwise,
     resumed,
+    seek_again,
     tighten,
 )
 from kemba.ocp.relaxation.session import Schedule, Session, Stopped
 from kemba.ocp.relaxation.settings import Grids
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
+from kemba.ocp.transcription.level import Rise
 from kemba.ocp.transcription.symmetry import (
     Reduction,
     equal_legs,
@@ -55,7 +60,8 @@ class Planner:
     """Builds programs of one task on demand and solves them by a list of strategies.
 
     `lags`: the model with first-order chambers in the place of physical ones, and what is asked of
-    it; plans are sought on it before they are refined on the model itself.
+    it; plans are sought on it before they are refined on the model itself. `scene`: the planner in
+    a scene with walls for which this one has level ground, and `rises` of it.
     """
 
     task: Task
@@ -66,6 +72,8 @@ class Planner:
     pulse: float = 0.0  # [s], of valves that are sought; the task's dwell where that is more
     outcome: Outcome | None = None  # of the elastic solve after a failure
     lags: tuple[Model, list[Requirement]] | None = None
+    scene: Planner | None = None
+    rises: tuple[Rise, ...] = ()
 
     @property
     def seeking(self) -> Planner:
@@ -83,7 +91,8 @@ class Planner:
         else:
             requirements = self.alike if reduction.symmetric else self.requirements
         with self.session.building.running():
-            program = Transcription(self.model, self.task, requirements, reduction, nodes)
+            known = self.model, self.task, requirements, reduction, nodes
+            program = Transcription(*known, self.rises)
         options = {"max_iter": self.task.solver.max_iterations, **self.task.solver.options}
         name = "half" if reduction.symmetric else "whole"
         name = "one leg for all of the" if reduction is self.one_leg else name
@@ -91,9 +100,10 @@ class Planner:
         return self.session.schedule(program, options, where, self.pulse)
 
     def guess(self, transcription: Transcription) -> Iterate:
-        """The automatic start guess on a program's grid."""
-        t = transcription
-        return Iterate(automatic_guess(self.model, self.task, self.requirements, t.layout, t.nodes))
+        """The automatic start guess on a program's grid, of the scene's course."""
+        t, own = transcription, self.scene or self
+        Y = automatic_guess(own.model, own.task, own.requirements, t.layout, t.nodes)
+        return Iterate(np.clip(t.raised(Y, -1.0), t.layout.lower, t.layout.upper))
 
     @cached_property
     def half(self) -> Reduction | None:
@@ -111,6 +121,11 @@ class Planner:
         return mirrored_requirements(self.model, self.requirements)
 
     @property
+    def coarse(self) -> bool:
+        """Whether plans are sought on a coarser grid first."""
+        return self.task.solver.coarse and self.task.nodes // 2 >= Grids.coarsest
+
+    @property
     def together(self) -> bool:
         """Whether all legs stand together, as far as `contacts` says: half a robot knows nothing
         of legs that stand one after the other."""
@@ -125,13 +140,13 @@ class Planner:
 
     def strategies(self) -> Iterator[Callable[[], tuple[Transcription, Iterate]]]:
         """Ways to a plan, the quickest first; from the given start before any guess."""
-        nodes = self.task.nodes
         for reduction in self.reductions() if self.start is not None else ():
             yield lambda r=reduction: self._continued(r)  # type: ignore[misc]
         for reduction in self.reductions():
-            if self.task.solver.coarse and nodes // 2 >= Grids.coarsest:
+            if self.coarse:
                 yield lambda r=reduction: self._coarse_to_fine(r)  # type: ignore[misc]
-            yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
+            if self.scene is None:
+                yield lambda r=reduction: self._direct(r)  # type: ignore[misc]
 
     def _coarse_to_fine(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
         first, *finer = grids(self.task.nodes, self.task.duration)
@@ -141,7 +156,8 @@ class Planner:
             if not point.solved:
                 return schedule.transcription, point
             coarse, schedule = schedule, self.schedule(nodes, reduction)
-            point = refine_grid(schedule, coarse.transcription, point)
+            known = schedule, coarse.transcription, point
+            point = refine_grid(*known) if self.scene is None else seek_again(*known)
         return self._finish(schedule, point)
 
     def _direct(self, reduction: Reduction) -> tuple[Transcription, Iterate]:
@@ -156,8 +172,14 @@ class Planner:
 
     def _sought(self, schedule: Schedule) -> Iterate:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
-        requirements differ, else from the guess."""
+        requirements differ, else from the guess. On level ground for walls a relaxed one: its
+        valves are sought on the finer grid, as rounded on this one they cost ten times as much."""
         t = schedule.transcription
+        if self.scene is not None:
+            sides = {r.label for r in self.requirements}
+            sides -= {r.label for r in self.scene.requirements}
+            rows = np.array([m.label in sides for m in t.meanings])
+            return relax_stepwise(schedule, self.guess(t), rows)
         fewer = self.one_leg
         if self.half is not None and self.alike != self.requirements:
             fewer = self.half
@@ -177,7 +199,7 @@ class Planner:
         point = tighten(schedule, point) if point.solved else point
         if not point.solved or not schedule.transcription.reduction.symmetric:
             return schedule.transcription, point
-        full = self.schedule(self.task.nodes, whole(self.model.node))
+        full = self.schedule(schedule.transcription.nodes, whole(self.model.node))
         return full.transcription, confirm(full, schedule.transcription, point)
 
     def penalty(self) -> tuple[Transcription, Iterate]:
@@ -209,7 +231,9 @@ class Planner:
             return stop.transcription, stop.point
 
     def elastic(self) -> Outcome | None:
-        """Which requirements an elastic solve violates."""
+        """Which requirements an elastic solve violates; None on ground that is not the task's."""
+        if self.scene is not None:
+            return None
         reduction = next(self.reductions())
         return elastic(self.model, self.task, self.requirements, reduction, self.session)
 
@@ -225,4 +249,5 @@ class Planner:
 def searched(planner: Planner, refused: bool) -> Plan:
     """What the strategies find, judged; the start guess for a task that a check refused."""
     transcription, point = planner.refuse() if refused else planner.run()
-    return judge(planner.requirements, transcription, point)
+    own = planner.scene or planner
+    return judge(own.model, own.requirements, transcription, point)

@@ -28,7 +28,6 @@ from kemba.ocp.infeasibility.explain import Diagnostic, Explanation, explanation
 from kemba.ocp.nlp.ipopt import Control, Watch
 from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
-from kemba.ocp.raised import lowered, raised, rises
 from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
@@ -108,9 +107,8 @@ class Planning:
 
     def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
-        the other as long as they give any, on level ground first where the scene rises from there;
-        none whose contacts and valves come in the order of an earlier one, as the same program
-        would refine it."""
+        the other as long as they give any; none whose contacts and valves come in the order of an
+        earlier one, as the same program would refine it."""
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -121,18 +119,11 @@ class Planning:
                 failed = LEFT
             failed = failed if origin.given else ""
         task, planner, orders = self.planner.task, self.planner, _Orders()
-        free = planner.start is None and not self.refused
-        rising = self._raised() if free and rises(task) else iter(())
         for number, guess in enumerate(guesses(task, planner.model)):
             if number and self.over:
                 return
             if number:
                 planner.session.tell("another guess")
-            near = next(rising, None)
-            if near is not None:
-                yield near
-                if self.over:
-                    return
             own = guess if planner.start is None else replace(guess, pulse=0.0)
             found = self._from_guess(own, orders.new)
             if found is None:
@@ -173,17 +164,6 @@ class Planning:
             found = found if why is None else explained(found, why)
         plain = found.plain and self._timed(self._clear(replace(found.plain, task=task)))
         return replace(self._timed(self._clear(found)), plain=plain)
-
-    def _raised(self) -> Iterator[Plan | None]:
-        """Of one plan on level ground after the other that in the task's scene; None where that
-        is not refined, or the scene does not rise from it."""
-        planner, document = self.planner, self.document
-        level = replace(self, planner=lowered(planner, document, 0.0))
-        planner.session.tell("from level ground")
-        for first in level.plans():
-            with self.clock.running():
-                found = raised(first, planner, document) if first.refined else None
-            yield found and self._timed(self._clear(found))
 
     def _clear(self, found: Plan) -> Plan:
         asked = found.status is Status.SOLVED and self.planner.task.clearance

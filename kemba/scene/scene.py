@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan, pi, tan
+from math import pi, tan
 from typing import Annotated, Any, ClassVar
 
 import casadi as ca
@@ -42,9 +42,8 @@ class Terrain(Section):
         there. None: it stays as it is."""
         return None
 
-    def lowered(self, share: float, base: float) -> Terrain:
-        """The line with a `share` of its heights above `base` [m]; as it is where a kind has none,
-        and then no plan is sought from level ground."""
+    def levelled(self, base: float) -> Terrain:
+        """The line at a height of `base` [m]; as it is where a kind is not level."""
         return self
 
     def dump(self) -> dict[str, Any]:
@@ -64,12 +63,6 @@ class Ramp(Terrain):
         first = before if self.height is None else self.height
         return first + tan(self.slope) * (x - (self.begin or 0.0))
 
-    def lowered(self, share: float, base: float) -> Ramp:
-        """Of its slope, and of its height where it has one."""
-        first = None if self.height is None else base + share * (self.height - base)
-        new = {"slope": atan(share * tan(self.slope)), "height": first}
-        return self.model_copy(update=new)
-
 
 class Level(Terrain):
     """`{from: 0.45 m, height: 0.15 m}`."""
@@ -81,9 +74,8 @@ class Level(Terrain):
     def surface(self, x: ca.SX, before: float) -> ca.SX:
         return ca.SX(self.height)
 
-    def lowered(self, share: float, base: float) -> Level:
-        """Of its height."""
-        return self.model_copy(update={"height": base + share * (self.height - base)})
+    def levelled(self, base: float) -> Level:
+        return self.model_copy(update={"height": base})
 
 
 def kinds() -> dict[str, type[Terrain]]:
@@ -367,13 +359,10 @@ class Scene(Section):
         """Whether there are walls or obstacles, whose corners a motion may cut."""
         return bool(self.obstacles) or len(self.ground.stretches) > 1
 
-    def lowered(self, share: float, x: float) -> Scene:
-        """The scene with a `share` of its heights above the ground at x [m]; with none there are no
-        obstacles."""
+    def levelled(self, x: float) -> Scene:
+        """The scene without obstacles, its ground as high everywhere as at x [m]."""
         base = float(self.ground.height(x))
-        boxes = [box.model_copy(update={"height": share * box.height}) for box in self.obstacles]
-        terrain = tuple(line.lowered(share, base) for line in self.terrain)
-        return Scene(terrain=terrain, obstacles=tuple(boxes) if share > 0.0 else ())
+        return Scene(terrain=tuple(line.levelled(base) for line in self.terrain))
 
     def skyline(self, x: np.ndarray) -> np.ndarray:
         """Height [m] of what is lowest for a foot at places x (n,): the ground, or `AROUND` an

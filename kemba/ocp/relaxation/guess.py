@@ -109,10 +109,16 @@ def jump(
     stretched = reach[0] + STRETCH * (reach[1] - reach[0])
     feet = {}
     for leg, place in robot.legs.items():
-        under = x + place.hip
-        low = np.where(airborne, scene.skyline(under), scene.ground.height(under))
-        length = np.minimum(z - low, stretched)
-        feet[leg] = np.column_stack([np.zeros_like(length), -length])
+        hips = np.column_stack([x + place.hip, z])
+        if scene.cornered and airborne.any():  # up before a wall, then over it
+            begin, end = course.flight
+            parts = [(0.0, begin), (begin, end), (end, task.duration)]
+            places = [r for r in requirements if r.quantity.name == f"{leg}/foot/x"]
+            stands = np.array([True, False, end < task.duration])
+            feet[leg] = _foot(task, parts, stands, t, hips, reach, places) - hips
+        else:
+            length = np.minimum(z - scene.ground.height(hips[:, 0]), stretched)
+            feet[leg] = np.column_stack([np.zeros_like(length), -length])
     bears = model.mechanism.mass * np.maximum(az + model.mechanism.gravity, 0.0)
     load = np.where(airborne, 0.0, bears) / len(robot.legs)
     return Course(x, z, np.zeros_like(z), feet, dict.fromkeys(robot.legs, load))
@@ -310,8 +316,8 @@ def _foot(
     asked: Sequence[Requirement],
 ) -> Array:
     """Where a foot is (n, 2): on the ground below its hip's place in the middle of each stance, or
-    the nearest place that is `asked` of it there, and swinging between, over all that stands there;
-    turned with the body before its first and after its last stance."""
+    the nearest place that is `asked` of it there, and swinging between, over all that stands there
+    as far as the leg folds; turned with the body before its first and after its last stance."""
     runs: list[tuple[float, float]] = []
     for (begin, end), on in zip(parts, stands, strict=True):
         if on and runs and runs[-1][1] == begin:
@@ -338,14 +344,14 @@ def _foot(
         ahead, inside = places[i] + way * WITHIN, np.sin(np.pi * WITHIN) ** 2
         over = task.scene.skyline(ahead) - heights[i] - rise * WITHIN
         if over.max() > 0.0:  # up first, then across
-            across = _cycloid(_cycloid(WITHIN))
+            across = _cycloid(WITHIN)
             over = task.scene.skyline(places[i] + way * across) - heights[i] - rise * WITHIN
-            x += way * _cycloid(_cycloid(swing))
+            x += way * _cycloid(swing)
         else:
             x += way * swing
         bump = LIFT + max(0.0, float((over / inside).max()))
         z += rise * swing + bump * np.sin(np.pi * swing) ** 2
-    return np.column_stack([x, z])
+    return np.column_stack([x, np.minimum(z, hips[:, 1] - reach[0])])  # folded, at most
 
 
 def _cycloid(share: Array) -> Array:

@@ -16,7 +16,7 @@ from kemba.ocp.relaxation.settings import Ends, Grids, Relaxation, Starts
 from kemba.ocp.transcription.solution import arrays
 from kemba.ocp.transcription.stage import COST_SCALE
 from kemba.ocp.transcription.transcribe import Parameters, Transcription
-from kemba.trajectory import Trajectory
+from kemba.trajectory import Array, Trajectory
 
 RELAX = "relax"  # the name of a schedule's first solve
 
@@ -47,6 +47,48 @@ def find(schedule: Schedule, start: Iterate) -> Iterate:
     if point.ending in (Ending.INFEASIBLE, Ending.ITERATION_LIMIT):
         return point  # it would not converge with tighter pairs either
     return binary(schedule, point)
+
+
+def relax_stepwise(schedule: Schedule, start: Iterate, rows: np.ndarray) -> Iterate:
+    """From a guess to a relaxed plan that meets the `rows` (rows,) of the program, too, which are
+    left out at first.
+
+    Continuation in their bounds, from what the first solve leaves to what is asked, in steps that
+    double where one is solved and halve where it is not (Allgower and Georg, Introduction to
+    Numerical Continuation Methods, SIAM 2003).
+    """
+    program = schedule.transcription
+    asked = program.g_lower[rows], program.g_upper[rows]
+    parameters = Parameters(Relaxation.loose, forces=Relaxation.forces)
+
+    def solved(point: Iterate, lower: Array, upper: Array, most: int, **options: Any) -> Iterate:
+        program.g_lower[rows], program.g_upper[rows] = lower, upper
+        options["max_iter"] = schedule.at_most(most)
+        return schedule.solve(RELAX, point, parameters, options=options)
+
+    free = np.full(rows.sum(), np.inf)
+    point = solved(start, -free, free, Ends.relax_iterations, **interior())
+    g = program.problem.g(point.Y.ravel(), parameters.vector(program.nodes))
+    left = np.array(g).ravel()[rows]
+    off = [np.where(np.isfinite(a), left - a, 0.0) for a in asked]
+    share, step = 0.0, FIRST_STEP
+    while share < 1.0 and step >= LEAST_STEP:
+        new = min(1.0, share + step)
+        below, above = (1.0 - new) * np.minimum(off[0], 0.0), (1.0 - new) * np.maximum(off[1], 0.0)
+        options = warm(Starts.changed_mu, Starts.changed, tol=Ends.tol)
+        bounds = asked[0] + below, asked[1] + above
+        found = solved(point, *bounds, STEP_ITERATIONS, **options)
+        if found.solved:
+            point, share, step = found, new, 2.0 * step
+        else:
+            step /= 2.0
+    program.g_lower[rows], program.g_upper[rows] = asked
+    return point if share == 1.0 else replace(point, ending=found.ending)
+
+
+FIRST_STEP = 1 / 4  # of what the bounds change
+LEAST_STEP = 1 / 16
+STEP_ITERATIONS = 150  # where a step is solved it takes 50 to 130
 
 
 def binary(schedule: Schedule, point: Iterate, push: float = WARM_PUSH) -> Iterate:
@@ -117,17 +159,23 @@ def refine_grid(schedule: Schedule, coarse: Transcription, point: Iterate) -> It
     longest = schedule.at_most(Ends.misfit_iterations)
     stagnation = Stagnation(Ends.stagnation_iterations, Ends.stagnation_near)
     kept = fix(schedule, start, forces=0.0, stagnation=stagnation, max_iter=longest)
-    if kept.solved:
-        return kept
-    return fix(schedule, binary(schedule, start, Starts.changed), forces=0.0)
+    return kept if kept.solved else seek_again(schedule, coarse, point)
+
+
+def seek_again(schedule: Schedule, coarse: Transcription, point: Iterate) -> Iterate:
+    """The valves of a coarse plan sought on the finer grid of `schedule`."""
+    start = Iterate(prolong(coarse, schedule.transcription, point.Y))
+    found = binary(schedule, start, Starts.changed)
+    return fix(schedule, found, forces=0.0) if found.solved else found
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
     """Y (coarse nodes + 1, n) on a finer grid (fine nodes + 1, n): states in between, inputs and
     forces held."""
     at = np.linspace(0.0, coarse.nodes, fine.nodes + 1)
-    groups = coarse.layout.slices.items()
-    return np.hstack([_at_nodes(Y[:, part], at, group in HELD) for group, part in groups])
+    groups, raised = coarse.layout.slices.items(), coarse.raised(Y)
+    finer = np.hstack([_at_nodes(raised[:, part], at, group in HELD) for group, part in groups])
+    return fine.raised(finer, -1.0)
 
 
 # weights rho of the paper's penalty method (eq. 9), and of a ramp that ends there

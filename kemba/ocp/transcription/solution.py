@@ -1,24 +1,45 @@
 """A solved program as a trajectory at the nodes, and back."""
 
+import casadi as ca
 import numpy as np
 
 from kemba.model import Model
+from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
+from kemba.ocp.transcription.unilateral import rigid_constraints
 from kemba.trajectory import Trajectory
 
+FLIES = 1e-3  # N; a foot with less force flies
 
-def to_trajectory(transcription: Transcription, Y: np.ndarray) -> Trajectory:
+
+def to_trajectory(
+    transcription: Transcription, Y: np.ndarray, model: Model | None = None
+) -> Trajectory:
     """Every quantity of the model at the nodes, from scaled variables `Y` (nodes + 1, n).
 
     Inputs and forces of a row act on the interval before it (implicit Euler); at the first node
-    they are zero.
+    they are zero. `model`: the same one in a scene with walls, where the program has level ground.
     """
     layout, h = transcription.layout, transcription.h(Y)[:, None]
-    x = {g: layout.full(Y, g) for g in ("q", "v", "s", "u", "lam")}
+    x = {g: layout.full(transcription.raised(Y), g) for g in ("q", "v", "s", "u", "lam")}
+    if model is not None:
+        _slip_along(model, x)
     a, sd = np.zeros_like(x["v"]), np.zeros_like(x["s"])
     a[1:], sd[1:] = np.diff(x["v"], axis=0) / h, np.diff(x["s"], axis=0) / h
     name = transcription.task.name
-    return written(transcription.model, name, transcription.times(Y), x, a, sd)
+    return written(model or transcription.model, name, transcription.times(Y), x, a, sd)
+
+
+def _slip_along(model: Model, x: dict[str, np.ndarray]) -> None:
+    """Slip speeds of feet without force are along the ground of the model's own scene."""
+    node = model.node
+    for foot in rigid_constraints(model, whole(node)):
+        if foot.friction is not None:
+            slip = ca.Function("slip", [node.q, node.v], [foot.friction.slip])
+            along = np.abs(np.array(slip.map(len(x["q"]))(x["q"].T, x["v"].T)).ravel())
+            flies = x["lam"][:, foot.force] < FLIES
+            flies[0] = False  # there all forces are zero
+            x["lam"][flies, foot.friction.speed] = along[flies]
 
 
 def written(

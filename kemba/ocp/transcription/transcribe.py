@@ -29,6 +29,7 @@ from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.first_node import granted, state_rows
 from kemba.ocp.transcription.layout import STEP, Layout
+from kemba.ocp.transcription.level import Rise, ground_at_nodes
 from kemba.ocp.transcription.stage import (
     INF,
     Interval,
@@ -42,6 +43,7 @@ from kemba.ocp.transcription.stage import (
 )
 from kemba.ocp.transcription.symmetry import Reduction
 from kemba.ocp.transcription.unilateral import rigid_constraints
+from kemba.trajectory import Array
 
 
 @dataclass(frozen=True)
@@ -82,8 +84,10 @@ class Meaning:
 class Transcription:
     """The program of one task on one grid, see the legend above.
 
-    `layout` says where each quantity is in y. `lower`, `upper` (N + 1, n) bound Y; `g_lower`,
-    `g_upper` (rows,) bound g. `meanings` says what each row of g is; `problem` has the functions.
+    With `rises` the ground is level and changes its height in flights: heights count from the
+    `ground` (N + 1,) [m] of their node. `layout` says where each quantity is in y. `lower`, `upper`
+    (N + 1, n) bound Y; `g_lower`, `g_upper` (rows,) bound g. `meanings` says what each row of g is;
+    `problem` has the functions.
     """
 
     def __init__(
@@ -93,6 +97,7 @@ class Transcription:
         requirements: Sequence[Requirement],
         reduction: Reduction,
         nodes: int,
+        rises: Sequence[Rise] = (),
     ) -> None:
         self.model, self.task, self.requirements, self.nodes = model, task, requirements, nodes
         self.reduction = reduction
@@ -120,7 +125,27 @@ class Transcription:
             g_bounds += [(rows.lower, rows.upper)] * len(where) * len(rows.labels)
         self.meanings = meanings
         self.g_lower, self.g_upper = (np.array(b) for b in zip(*g_bounds, strict=True))
+        self.ground = ground_at_nodes(rises, nodes)
+        for k in np.flatnonzero(np.diff(self.ground)) + 1:
+            row = meanings.index(Meaning("defect", "kinematics:body/z", int(k)))
+            rise = (self.ground[k] - self.ground[k - 1]) / self.layout.scale[self._height]
+            self.g_lower[row] = self.g_upper[row] = -rise
         self.problem = block_problem(blocks, index.size, p, shared=True)
+
+    @property
+    def _height(self) -> int:
+        """The column of Y that holds the body's height."""
+        names = [q.name for q in self.layout.quantities["q"]]
+        return int(self.layout.slices["q"].start) + names.index("body/z")
+
+    def raised(self, Y: Array, sign: float = 1.0) -> Array:
+        """Y (nodes + 1, n) with heights above the ground of the start, where those of the program
+        count from the ground of their node; with a `sign` of -1 the reverse."""
+        if not self.ground.any():
+            return Y
+        higher = np.zeros(Y.shape)
+        higher[:, self._height] = sign * self.ground / self.layout.scale[self._height]
+        return np.asarray(Y + higher)
 
     def _rest_before_start(self) -> None:
         """Inputs and forces of node 0 are fixed at zero and its step at the nominal one."""
@@ -217,7 +242,8 @@ class Transcription:
         stage, n, blocks = self.stage, self.layout.size, []
         ends = [self.layout.full(y, "q") for y in (stage.y0, stage.y)]
         both, where = np.hstack([index[:-1, :n], index[1:, :n]]), list(range(1, self.nodes + 1))
-        for requirement in (r for r in self.requirements if r.location[0] == "obstacles"):
+        kept = [r for r in self.requirements if r.location[0] == "obstacles" and r.always]
+        for requirement in kept:
             room = quantity_expression(self.model, requirement.quantity.name)
             for share in WITHIN:
                 q = (1 - share) * ends[0] + share * ends[1]
