@@ -162,20 +162,16 @@ def test_the_skyline_keeps_as_far_from_either_side_of_an_obstacle() -> None:
     assert scene_in(HOUSE).skyline(beside) == pytest.approx([0.0, high, high, 0.0])
 
 
-def test_a_lowered_scene_has_a_share_of_its_heights() -> None:
-    """Above the ground at a place; of slopes and obstacles too."""
+def test_a_levelled_scene_is_as_high_everywhere_and_free() -> None:
+    """Its friction stays; a slope does, too, and is not level then."""
     lines = [
         {"height": "0.3 m"},
         {"from": "0.4 m", "height": "0 m"},
-        {"from": "1 m", "slope": "10 deg", "friction": 0.5},
+        {"from": "1 m", "friction": 0.5},
     ]
     boxes = [{"from": "-0.5 m", "to": "-0.4 m", "height": "0.2 m"}]
-    scene = scene_in({"terrain": lines, "obstacles": boxes})
-    half = scene.lowered(0.5, 0.0)
-    x = np.array([-1.0, 0.0, 0.7, 1.2, 1.5])
-    np.testing.assert_allclose(half.ground.height(x) - 0.3, 0.5 * (scene.ground.height(x) - 0.3))
-    assert half.ground.friction(1.5, 0.8) == 0.5
-    assert half.obstacles[0].top(half.ground) == pytest.approx(0.4)
-    level = scene.lowered(0.0, 0.0)
+    level = scene_in({"terrain": lines, "obstacles": boxes}).levelled(0.0)
     assert level.ground.level == 0.3 and not level.obstacles
-    assert scene.lowered(1.0, 0.0) == scene
+    assert level.ground.friction(1.5, 0.8) == 0.5
+    ramp = scene_in({"terrain": [*lines, {"from": "2 m", "slope": "10 deg"}]})
+    assert ramp.levelled(0.0).ground.level is None
