@@ -47,7 +47,7 @@ OF_SCENE = ("/z", "/distance", "/room")  # what an expression must not hold: it 
 
 def on_level_ground(planner: Planner) -> Planner | None:
     """The planner of the same motion on level ground, with sides for walls and obstacles; None
-    where the scene has none, is not level between them, or changes its height under a foot."""
+    where the scene has none, is not level between them, or feet stand on two heights at once."""
     scene, old = planner.task.scene, planner.model
     level = scene.levelled(planner.task.place_x)
     named = [r.quantity.name for r in planner.requirements]
@@ -123,9 +123,11 @@ class Course:
 
     @property
     def flies(self) -> bool:
-        """Whether all feet are off the ground whenever it changes."""
+        """Whether all feet are off the ground whenever it changes, and stand on one height."""
         nodes = [round(rise.share * self.nodes) for rise in self.rises]
-        return bool((self.gaps[:, nodes] > STANDS).all())
+        clear = self.gaps > STANDS
+        lowest = self.ground == self.ground.min(axis=0)
+        return bool(clear[:, nodes].all() and (clear | lowest).all())
 
     def on_level(self, r: Requirement) -> Iterator[Requirement]:
         """What stands for a requirement on level ground."""
