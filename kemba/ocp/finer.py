@@ -153,14 +153,11 @@ def found_and_refined(planner: Planner, refused: bool, new: Judge) -> Plan | Non
 
 
 def _sought(planner: Planner, refused: bool) -> Plan:
-    """A plan from the guess, on the model on which plans are sought; in a scene with walls on level
-    ground first."""
+    """A plan from the guess, on the model on which plans are sought, on level ground where it is
+    asked for."""
     seeker = planner.seeking
-    level = None if refused or planner.start is not None else on_level_ground(seeker)
-    if level is not None:
-        found = searched(level, refused)
-        if found.status.plan or planner.session.control.ended():
-            return found
+    if planner.level:
+        seeker = on_level_ground(seeker) or seeker
     found = searched(seeker, refused)
     planner.outcome = seeker.outcome
     return found

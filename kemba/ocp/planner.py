@@ -60,8 +60,9 @@ class Planner:
     """Builds programs of one task on demand and solves them by a list of strategies.
 
     `lags`: the model with first-order chambers in the place of physical ones, and what is asked of
-    it; plans are sought on it before they are refined on the model itself. `scene`: the planner in
-    a scene with walls for which this one has level ground, and `rises` of it.
+    it; plans are sought on it before they are refined on the model itself. `level`: whether plans
+    in a scene with walls are sought on level ground; `scene`: the planner in it for which this one
+    has level ground, with its `rises`.
     """
 
     task: Task
@@ -72,6 +73,7 @@ class Planner:
     pulse: float = 0.0  # [s], of valves that are sought; the task's dwell where that is more
     outcome: Outcome | None = None  # of the elastic solve after a failure
     lags: tuple[Model, list[Requirement]] | None = None
+    level: bool = False
     scene: Planner | None = None
     rises: tuple[Rise, ...] = ()
 

@@ -31,6 +31,7 @@ from kemba.ocp.planner import Planner
 from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
 from kemba.ocp.relaxation.session import Session
+from kemba.ocp.sides import on_level_ground
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.symmetry import whole
@@ -108,7 +109,8 @@ class Planning:
     def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
         the other as long as they give any; none whose contacts and valves come in the order of an
-        earlier one, as the same program would refine it."""
+        earlier one, as the same program would refine it. In a scene with walls the guesses are
+        followed on level ground, and one in the scene itself comes last."""
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -119,17 +121,24 @@ class Planning:
                 failed = LEFT
             failed = failed if origin.given else ""
         task, planner, orders = self.planner.task, self.planner, _Orders()
-        for number, guess in enumerate(guesses(task, planner.model)):
+        free = planner.start is None and self.refused is None
+        walls = free and on_level_ground(planner.seeking) is not None
+        missed: Plan | None = None
+        for number, guess in enumerate(guesses(task, planner.model, walls)):
             if number and self.over:
-                return
+                break
             if number:
                 planner.session.tell("another guess")
             own = guess if planner.start is None else replace(guess, pulse=0.0)
             found = self._from_guess(own, orders.new)
             if found is None:
                 continue
-            orders.keep(found)
             start = f"guess {number + 1}" if number else found.start
+            if guess.level and not (found.status.plan or found.status is Status.INTERRUPTED):
+                missed = replace(found, start=start)
+                continue
+            orders.keep(found)
+            missed = None
             for each, how in ((found, ""), (found.plain, ", without further pulses")):
                 if each is not None:
                     told = from_scratch(each, failed) if failed else each
@@ -137,6 +146,8 @@ class Planning:
             only = planner.start is not None or task.refine != "radau"
             if only or not found.status.plan:
                 return
+        if missed is not None:
+            yield missed
 
     def continued(self, origin: Origin) -> tuple[Plan | None, str]:
         """The task's plan from another one, or None and the reason where that fails."""
@@ -151,6 +162,7 @@ class Planning:
         begins = task.model_copy(update=guess.update)
         lags = self.planner.lags if guess.lags else None
         planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None, lags=lags)
+        planner.level = guess.level
         with self.clock.running():
             made = found_and_refined(planner, refused is not None, new)
             if made is None:
@@ -262,12 +274,14 @@ OTHERS = 2  # further guesses at most: each costs as much as the first
 @dataclass(frozen=True)
 class StartGuess:
     """A start guess with `noise` drawn by `seed`, and the shortest `pulse` [s] of a valve that is
-    sought from it; `lags`: by first-order chambers, where the model has physical ones."""
+    sought from it; `lags`: by first-order chambers, where the model has physical ones; `level`: on
+    level ground, with sides for walls."""
 
     pulse: float
     noise: float
     seed: int
     lags: bool = True
+    level: bool = False
 
     @property
     def update(self) -> dict[str, Any]:
@@ -275,8 +289,8 @@ class StartGuess:
         return {"guess_noise": self.noise, "seed": self.seed}
 
 
-def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
-    """The guesses of a task.
+def guesses(task: Task, model: Model, walls: bool = False) -> Sequence[StartGuess]:
+    """The guesses of a task; `walls`: its scene has some.
 
     A relaxed valve is open in part; rounded on a grid it opens and closes from node to node. Pulses
     that are shorter than the filling of a chamber move the leg little, and plans with many of them
@@ -290,7 +304,8 @@ def guesses(task: Task, model: Model) -> Sequence[StartGuess]:
     found = [first, *direct, replace(first, pulse=task.min_dwell)]
     noise = max(task.guess_noise, NOISE)
     found += [StartGuess(longer, noise, task.seed + k) for k in range(1, OTHERS + 1)]
-    return list(dict.fromkeys(found))
+    level = [replace(guess, level=True) for guess in found] if walls else []
+    return list(dict.fromkeys([*level, first] if walls else found))
 
 
 SPREAD = 0.25  # of the guess of all starts but the first: of every scale, so that minima differ

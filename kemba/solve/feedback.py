@@ -32,9 +32,10 @@ def first_with_feedback(
     trials: Iterable[Trial], execution: TrialOrder, deadline: float
 ) -> Trial | None:
     """The first of the trials, best ones first, that is good with its policy; None where none is
-    before the deadline [s]."""
-    for trial in sorted(trials, key=lambda trial: trial.score, reverse=True):
-        if time.monotonic() > deadline:
+    before the deadline [s]. The best one is tried in any case, which takes some seconds: where
+    planning takes all the time, feedback is what is left."""
+    for number, trial in enumerate(sorted(trials, key=lambda trial: trial.score, reverse=True)):
+        if number and time.monotonic() > deadline:
             break
         if found := with_feedback(trial, execution):
             return found

@@ -96,9 +96,13 @@ def binary(schedule: Schedule, point: Iterate, push: float = WARM_PUSH) -> Itera
     start moves `push` off the bounds."""
     tol, weights = Ends.tol, (Relaxation.loose, Relaxation.valve, Relaxation.switching)
     parameters = Parameters(*weights, forces=Relaxation.forces)
-    options = warm(Starts.changed_mu, push, tol=tol)
+    most = {"max_iter": schedule.at_most(Ends.valve_iterations)}
+    options = warm(Starts.changed_mu, push, tol=tol, **most)
     point = schedule.solve("binary valves", point, parameters, options=options)
-    options, fixed = warm(Starts.rounded_mu, Starts.rounded, tol=tol), schedule.valves(point)
+    options, fixed = (
+        warm(Starts.rounded_mu, Starts.rounded, tol=tol, **most),
+        schedule.valves(point),
+    )
     parameters = Parameters(Relaxation.loose, forces=Relaxation.forces)
     return schedule.solve("round valves", point, parameters, options=options, fixed=fixed)
 
@@ -165,8 +169,8 @@ def refine_grid(schedule: Schedule, coarse: Transcription, point: Iterate) -> It
 def seek_again(schedule: Schedule, coarse: Transcription, point: Iterate) -> Iterate:
     """The valves of a coarse plan sought on the finer grid of `schedule`."""
     start = Iterate(prolong(coarse, schedule.transcription, point.Y))
-    found = binary(schedule, start, Starts.changed)
-    return fix(schedule, found, forces=0.0) if found.solved else found
+    found, most = binary(schedule, start, Starts.changed), schedule.at_most(Ends.valve_iterations)
+    return fix(schedule, found, forces=0.0, max_iter=most) if found.solved else found
 
 
 def prolong(coarse: Transcription, fine: Transcription, Y: np.ndarray) -> np.ndarray:
