@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kemba.ocp.certificate.status import Status
+from kemba.ocp.planned import Plan, judge
 from kemba.ocp.planner import Planner
-from kemba.ocp.planning import Planning, plan
+from kemba.ocp.planning import Planning, StartGuess, guesses, plan
 from kemba.ocp.reading import load_task
 from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.sides import Course, on_level_ground, runs
@@ -135,6 +137,32 @@ def test_what_is_asked_of_the_scene_by_an_expression_needs_the_scene() -> None:
     named = replace(first.quantity, name="front/foot/z - rear/foot/z")
     asked: list[Requirement] = [replace(first, quantity=named)]
     assert on_level_ground(replace(found, requirements=[*found.requirements, *asked])) is None
+
+
+@pytest.mark.parametrize("found", [False, True])
+def test_every_guess_is_followed_on_level_ground_and_one_in_the_scene(
+    found: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where none gives a plan, that in the scene says why."""
+    made: list[StartGuess] = []
+    planning = Planning.of(*load_task("platform.yaml"))
+    old = planning.planner.refuse()
+
+    def from_guess(self: Planning, guess: StartGuess, new: object) -> Plan:
+        made.append(guess)
+        none = judge(self.planner.model, self.planner.requirements, *old)
+        return replace(none, status=Status.SOLVED) if found and guess.level else none
+
+    monkeypatch.setattr(Planning, "_from_guess", from_guess)
+    plans = [*planning.plans()]
+    assert [guess.level for guess in made] == [True] * (len(made) - 1) + [False]
+    assert len(plans) == (len(made) if found else 1)
+    assert plans[-1].start == f"guess {len(made)}"
+
+
+def test_without_walls_no_guess_is_on_level_ground() -> None:
+    own = planner("jump_forward.yaml")
+    assert not any(guess.level for guess in guesses(own.task, own.model))
 
 
 @pytest.mark.slow
