@@ -12,7 +12,7 @@ ROOT = HERE.parent
 IMAGES = ROOT / "docs/images/gallery"
 ORDER = (
     "jump", "max_jump", "max_jump_land", "hop", "forward", "drop", "bound", "popup", "accelerate",
-    "supply_pressure", "payload", "other_robot",
+    "hurdle", "supply_pressure", "payload", "other_robot",
     "repeats", "where_it_fails", "what_is_missing", "bench", "own_effect", "foreign_log",
 )  # fmt: skip
 

@@ -1,0 +1,14 @@
+"""Over a hurdle.
+
+20 cm high and 5 cm wide: front feet first, legs folded, then the rear ones, and at rest behind it.
+"""
+
+from pictures import animate, save
+
+import kemba
+
+motion = kemba.plan("hurdle.yaml")
+print(motion.sentence)
+assert motion.good
+save(motion.figure())
+animate(motion.path)
