@@ -1,13 +1,18 @@
 """Where the plant does not keep to the table alone, a plan is played with its policy."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from kemba.files import read_json
 from kemba.policy.player import Policy
 from kemba.scenarios.feedback import words_of
+from kemba.solve import feedback
+from kemba.solve.trial import TrialOrder
 from kemba_cli.main import app
 
 
@@ -39,3 +44,20 @@ def test_feedback_is_kept_only_where_it_decides(late: str, code: int, tmp_path: 
     assert solved(tmp_path / "run", late) == code
     found = read_json(tmp_path / "run" / "certificate.json")
     assert "feedback" not in found and not (tmp_path / "run" / "policy.npz").exists()
+
+
+def test_the_best_trial_is_tried_with_feedback_even_where_time_is_over(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And after the deadline no other one."""
+    tried: list[float] = []
+
+    def with_feedback(trial: Any, execution: TrialOrder) -> None:
+        tried.append(trial.score)
+
+    monkeypatch.setattr(feedback, "with_feedback", with_feedback)
+    trials: Any = [SimpleNamespace(score=score) for score in (1.0, 3.0, 2.0)]
+    assert feedback.first_with_feedback(trials, TrialOrder(), deadline=0.0) is None
+    assert tried == [3.0]
+    assert feedback.first_with_feedback(trials, TrialOrder(), deadline=np.inf) is None
+    assert tried == [3.0, 3.0, 2.0, 1.0]
