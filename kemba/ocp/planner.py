@@ -33,7 +33,7 @@ from kemba.ocp.relaxation.session import Schedule, Session, Stopped
 from kemba.ocp.relaxation.settings import Grids
 from kemba.ocp.task.requirement import Requirement
 from kemba.ocp.task.task import Task
-from kemba.ocp.transcription.level import Rise
+from kemba.ocp.transcription.level import GroundRise
 from kemba.ocp.transcription.symmetry import (
     Reduction,
     equal_legs,
@@ -75,7 +75,7 @@ class Planner:
     lags: tuple[Model, list[Requirement]] | None = None
     level: bool = False
     scene: Planner | None = None
-    rises: tuple[Rise, ...] = ()
+    rises: tuple[GroundRise, ...] = ()
 
     @property
     def seeking(self) -> Planner:

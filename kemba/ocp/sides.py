@@ -32,7 +32,7 @@ from kemba.ocp.relaxation.guess import automatic_guess
 from kemba.ocp.task.expressions import is_expression
 from kemba.ocp.task.requirement import Requirement, quantities, quantity_expression
 from kemba.ocp.transcription.layout import Layout
-from kemba.ocp.transcription.level import Rise, ground_after
+from kemba.ocp.transcription.level import GroundRise, ground_after
 from kemba.ocp.transcription.symmetry import whole
 from kemba.scene.scene import EDGE, Solid
 from kemba.trajectory import Array
@@ -54,7 +54,7 @@ def on_level_ground(planner: Planner) -> Planner | None:
     strange = any(is_expression(name) and any(s in name for s in OF_SCENE) for name in named)
     if not (scene.cornered and planner.coarse) or level.ground.level is None or strange:
         return None
-    course = Course(planner)
+    course = GuessedCourse(planner)
     if not course.flies:
         return None
     mechanism = old.mechanism
@@ -66,7 +66,7 @@ def on_level_ground(planner: Planner) -> Planner | None:
 
 
 @dataclass(frozen=True)
-class Course:
+class GuessedCourse:
     """Where the points of a robot are by the start guess, at the nodes of the coarsest grid."""
 
     planner: Planner
@@ -114,12 +114,12 @@ class Course:
         return np.asarray(tops[self.under])
 
     @cached_property
-    def rises(self) -> tuple[Rise, ...]:
+    def rises(self) -> tuple[GroundRise, ...]:
         """When the lowest ground under a foot changes: upwards with the last foot, downwards with
         the first one."""
         changes = np.diff(self.ground.min(axis=0))
         nodes = map(int, np.flatnonzero(changes))
-        return tuple(Rise((k + 1) / self.nodes, float(changes[k])) for k in nodes)
+        return tuple(GroundRise((k + 1) / self.nodes, float(changes[k])) for k in nodes)
 
     @property
     def flies(self) -> bool:

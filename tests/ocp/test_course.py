@@ -12,6 +12,7 @@ from kemba.ocp.reading import asked_of
 from kemba.ocp.relaxation import guess
 from kemba.ocp.relaxation.guess import LIFT, Course, in_order
 from kemba.ocp.task.task import Task
+from kemba.scene.scene import AROUND
 
 STANCES = (
     "{on: [front, rear], share: 35 %}, {on: air, share: 35 %}, {on: [front, rear], share: 30 %}"
@@ -52,10 +53,13 @@ def test_on_level_ground_a_foot_swings_evenly() -> None:
     ],
 )
 def test_a_foot_swings_over_what_stands_between(words: tuple[str, ...]) -> None:
+    """And as far as the leg folds, 3 cm over an obstacle; never on the other side of its hip."""
     task, places = foot(*words)
+    folded = course_of(*words)[2].feet["front"][:, 1] >= -0.2 - 1e-9
     above = places[:, 1] - task.scene.skyline(places[:, 0])
-    assert above.min() > -5e-3  # it is looked at 19 shares of the swing
-    assert above.max() < 0.6
+    assert above[~folded].min() > -5e-3  # it is looked at 19 shares of the swing
+    assert above.min() > -AROUND
+    assert above.max() < 0.3
 
 
 @pytest.mark.parametrize("wall", ["0.15 m", "-0.2 m"])

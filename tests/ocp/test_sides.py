@@ -11,9 +11,9 @@ from kemba.ocp.planner import Planner
 from kemba.ocp.planning import Planning, StartGuess, guesses, plan
 from kemba.ocp.reading import load_task
 from kemba.ocp.relaxation.guess import automatic_guess
-from kemba.ocp.sides import Course, on_level_ground, runs
+from kemba.ocp.sides import GuessedCourse, on_level_ground, runs
 from kemba.ocp.task.requirement import Requirement
-from kemba.ocp.transcription.level import Rise, ground_after, ground_at_nodes
+from kemba.ocp.transcription.level import GroundRise, ground_after, ground_at_nodes
 from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
@@ -37,7 +37,7 @@ def level(task: str, *settings: str) -> Planner:
     [("platform.yaml", [0.15]), ("drop_off.yaml", [-0.3]), ("hurdle.yaml", [])],
 )
 def test_the_ground_rises_while_all_feet_fly(task: str, heights: list[float]) -> None:
-    course = Course(planner(task).seeking)
+    course = GuessedCourse(planner(task).seeking)
     assert [rise.height for rise in course.rises] == pytest.approx(heights)
     assert course.flies
     ground = level(task).model.mechanism.scene.ground
@@ -85,7 +85,7 @@ def test_no_point_gets_through_an_obstacle_between_two_nodes() -> None:
         front, over, behind = sorted(own, key=lambda r: r.during)
         assert front.during[1] == over.during[0] < over.during[1] == behind.during[0]
         assert over.lower == pytest.approx(0.2, abs=5e-3)
-    course = Course(planner("hurdle.yaml").seeking)
+    course = GuessedCourse(planner("hurdle.yaml").seeking)
     for leg in ("front", "rear"):
         assert (course.places[f"{leg}/foot"][1] < course.places[f"{leg}/hip"][1]).all()
 
@@ -105,7 +105,7 @@ def test_heights_count_from_the_ground_of_their_node() -> None:
 
 
 def test_the_ground_after_several_rises() -> None:
-    rises = (Rise(0.2, 0.1), Rise(0.6, -0.3))
+    rises = (GroundRise(0.2, 0.1), GroundRise(0.6, -0.3))
     assert [ground_after(rises, at) for at in (0.19, 0.2, 0.6)] == pytest.approx([0, 0.1, -0.2])
     assert ground_at_nodes(rises, 5) == pytest.approx([0, 0.1, 0.1, -0.2, -0.2, -0.2])
     assert [*runs("aab")] == [("a", 0, 1), ("b", 2, 2)]

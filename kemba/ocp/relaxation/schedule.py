@@ -87,7 +87,7 @@ def relax_stepwise(schedule: Schedule, start: Iterate, rows: np.ndarray) -> Iter
 
 
 FIRST_STEP = 1 / 4  # of what the bounds change
-LEAST_STEP = 1 / 16
+LEAST_STEP = 1 / 16  # of it; what no such step solves is no motion
 STEP_ITERATIONS = 150  # where a step is solved it takes 50 to 130
 
 

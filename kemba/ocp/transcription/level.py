@@ -14,7 +14,7 @@ SAME = 1e-9  # share of a motion; moments that are nearer are one
 
 
 @dataclass(frozen=True)
-class Rise:
+class GroundRise:
     """From a `share` of the nodes on the ground is `height` [m] higher than before; the share is a
     node of every grid."""
 
@@ -22,11 +22,11 @@ class Rise:
     height: float
 
 
-def ground_after(rises: Sequence[Rise], share: float) -> float:
+def ground_after(rises: Sequence[GroundRise], share: float) -> float:
     """Height of the ground beyond that at the start [m], at a share of the nodes."""
     return sum(rise.height for rise in rises if rise.share <= share + SAME)
 
 
-def ground_at_nodes(rises: Sequence[Rise], nodes: int) -> np.ndarray:
+def ground_at_nodes(rises: Sequence[GroundRise], nodes: int) -> np.ndarray:
     """The same at every node (nodes + 1,)."""
     return np.array([ground_after(rises, k / nodes) for k in range(nodes + 1)])

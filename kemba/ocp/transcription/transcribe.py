@@ -29,7 +29,7 @@ from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.first_node import granted, state_rows
 from kemba.ocp.transcription.layout import STEP, Layout
-from kemba.ocp.transcription.level import Rise, ground_at_nodes
+from kemba.ocp.transcription.level import GroundRise, ground_at_nodes
 from kemba.ocp.transcription.stage import (
     INF,
     Interval,
@@ -97,7 +97,7 @@ class Transcription:
         requirements: Sequence[Requirement],
         reduction: Reduction,
         nodes: int,
-        rises: Sequence[Rise] = (),
+        rises: Sequence[GroundRise] = (),
     ) -> None:
         self.model, self.task, self.requirements, self.nodes = model, task, requirements, nodes
         self.reduction = reduction
