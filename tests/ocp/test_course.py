@@ -59,7 +59,7 @@ def test_a_foot_swings_over_what_stands_between(words: tuple[str, ...]) -> None:
     above = places[:, 1] - task.scene.skyline(places[:, 0])
     assert above[~folded].min() > -5e-3  # it is looked at 19 shares of the swing
     assert above.min() > -AROUND
-    assert above.max() < 0.3
+    assert above.max() < 0.4
 
 
 @pytest.mark.parametrize("wall", ["0.15 m", "-0.2 m"])
