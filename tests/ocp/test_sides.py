@@ -18,7 +18,7 @@ from kemba.ocp.transcription.solution import to_trajectory
 from kemba.ocp.transcription.symmetry import whole
 from kemba.ocp.transcription.transcribe import Transcription
 
-STAIRS = "terrain=[{from: 0.32 m, height: 0.1 m}, {from: 1.2 m, height: 0.05 m}]"
+LOW = "terrain=[{height: 0.1 m}, {from: 0.235 m, height: 0 m}]"
 HALF = "terrain=[{from: 0 m, height: 0.05 m}]"  # between the legs
 
 
@@ -166,9 +166,10 @@ def test_without_walls_no_guess_is_on_level_ground() -> None:
 
 
 @pytest.mark.slow
-def test_a_jump_onto_a_platform_is_found() -> None:
+def test_a_jump_off_a_platform_is_found() -> None:
     """On nodes, from a guess; its certificate is that of the scene."""
-    found = plan(*load_task("platform.yaml", ["refine=none", STAIRS]))
+    found = plan(*load_task("drop_off.yaml", ["refine=none", "model=planning", LOW]))
     assert found.status.plan, found.sentence
-    assert found.trajectory["rear/foot/z"][-1] == pytest.approx(0.1, abs=1e-5)
+    assert found.trajectory["rear/foot/z"][0] == pytest.approx(0.1, abs=1e-5)
+    assert found.trajectory["rear/foot/z"][-1] == pytest.approx(0.0, abs=1e-5)
     assert found.certificate.within(found.task.tolerances)
