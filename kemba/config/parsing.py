@@ -405,10 +405,11 @@ def sound(document: Document, schema: type[BaseModel]) -> Document:
 
 
 def without(data: Any, place: Location) -> Any:
-    """A copy of plain data without the key at `place`; items of lists stay, others would move."""
+    """A copy of plain data without the key at `place`; of a list with a wrong item without the
+    list, as other items would move."""
     if not place or not isinstance(data, dict) or place[0] not in data:
         return data
     part, rest = str(place[0]), place[1:]
-    if not rest:
+    if not rest or isinstance(data[part], list):
         return {key: value for key, value in data.items() if key != part}
     return {**data, part: without(data[part], rest)}

@@ -73,3 +73,15 @@ def test_the_sound_part_is_what_the_schema_accepts(mine: Path) -> None:
     assert left["bounds"] == {"body/z": {"at_most": "height"}}
     assert left["goals"]["two"] == {"quantity": "body/z", "at": "midle", "equals": "3 kg"}
     assert Task.model_validate(left).name == "mine"
+
+
+def test_a_wrong_item_of_a_list_hides_no_other_mistake(mine: Path) -> None:
+    """An obstacle that ends before it begins, beside a leg, a name and a line of terrain."""
+    scene = "obstacles:\n- {from: 0.1 m, to: 0.05 m, height: 5 cm}\n"
+    scene += "terrain:\n- {from: 0.32 m, height: 8 cm}\n- {from: 0.33 m, height: 0.2 m}\n"
+    rest = "contacts:\n- {on: [rear, frnt], share: 100 %}\nend: {'*/foot/gapp': 0 m}\n"
+    mine.write_text(f"name: mine\n{scene}{rest}", encoding="utf-8")
+    with pytest.raises(ConfigErrors) as caught:
+        load_task(mine)
+    assert sorted(lines(caught.value)) == [3, 6, 7, 9]
+    assert "contacts: no leg 'frnt'; did you mean 'front'?" in str(caught.value)
