@@ -175,7 +175,7 @@ class Planner:
     def _sought(self, schedule: Schedule) -> Iterate:
         """A plan with binary valves: grown from half a robot's where legs are equal and only the
         requirements differ, else from the guess. On level ground for walls a relaxed one: its
-        valves are sought on the finer grid, as rounded on this one they cost ten times as much."""
+        valves are sought on the finer grid, which rounded on this one they seldom fit."""
         t = schedule.transcription
         if self.scene is not None:
             sides = {r.label for r in self.requirements}

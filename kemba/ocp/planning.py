@@ -161,8 +161,8 @@ class Planning:
         task = self.planner.task
         begins = task.model_copy(update=guess.update)
         lags = self.planner.lags if guess.lags else None
-        planner = replace(self.planner, task=begins, pulse=guess.pulse, outcome=None, lags=lags)
-        planner.level = guess.level
+        planner = replace(self.planner, task=begins, outcome=None, lags=lags)
+        planner = replace(planner, pulse=guess.pulse, level=guess.level)
         with self.clock.running():
             made = found_and_refined(planner, refused is not None, new)
             if made is None:

@@ -1,6 +1,8 @@
 """The order of solves: whole robots grow from half ones, and switches move as often as asked."""
 
 from contextlib import ExitStack
+from types import SimpleNamespace
+from typing import Any
 from unittest.mock import patch
 
 import numpy as np
@@ -10,8 +12,10 @@ from kemba.model import load_model
 from kemba.ocp import load_task, plan
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.nlp.ending import Ending, Stagnation
+from kemba.ocp.nlp.ipopt import Iterate
 from kemba.ocp.planned import Plan
 from kemba.ocp.relaxation.guess import body_course
+from kemba.ocp.relaxation.schedule import relax_stepwise
 from kemba.ocp.relaxation.settings import Ends
 from kemba.ocp.task.resolve import resolve
 
@@ -130,3 +134,40 @@ def test_a_guess_flies_where_feet_must_leave_the_ground(lift: str) -> None:
         assert np.all(np.diff(course.t) > 0.0) and np.all(np.isfinite(course(np.array(course.t))))
         spans.append(course.flight[1] - course.flight[0])
     assert spans[0] == 0.0 < 0.1 < spans[1]
+
+
+@pytest.mark.parametrize(
+    ("widest", "shares"),
+    [
+        (1.0, [0.25, 0.75, 1.0]),  # steps double where they are solved
+        (0.4, [0.25, 0.75, 0.5, 1.0, 0.75, 1.0]),  # and halve where they are not
+        (0.05, [0.25, 0.125, 0.0625]),
+    ],
+)
+def test_rows_that_are_left_out_at_first_come_in_by_steps(
+    widest: float, shares: list[float]
+) -> None:
+    """From what the first solve leaves, 3 above one bound and 2 below another, to what is asked;
+    rows that are met stay free of it, and the program asks for all in the end."""
+    asked = np.array([-np.inf, 0.0, 1.0]), np.array([4.0, np.inf, np.inf])
+    program: Any = SimpleNamespace(g_lower=asked[0].copy(), g_upper=asked[1].copy(), nodes=2)
+    program.problem = SimpleNamespace(g=lambda x, p: [7.0, -2.0, 5.0])
+    tried: list[float] = []
+    reached = [0.0]
+
+    def solve(name: str, point: Iterate, parameters: Any, options: Any) -> Iterate:
+        if np.isinf(program.g_upper[0]):
+            return Iterate(point.Y, ending=Ending.SOLVED)
+        share = 1.0 - (program.g_upper[0] - 4.0) / 3.0
+        assert program.g_lower[1] == pytest.approx(-2.0 * (1.0 - share))
+        assert program.g_lower[2] == 1.0
+        tried.append(share)
+        solved = bool(share - reached[-1] <= widest)
+        reached.extend([share] * solved)
+        return Iterate(point.Y, ending=Ending.SOLVED if solved else Ending.ITERATION_LIMIT)
+
+    schedule: Any = SimpleNamespace(transcription=program, solve=solve, at_most=int)
+    found = relax_stepwise(schedule, Iterate(np.zeros((3, 1))), np.ones(3, dtype=bool))
+    assert tried == pytest.approx(shares)
+    assert found.solved == (reached[-1] == 1.0)
+    assert (program.g_lower == asked[0]).all() and (program.g_upper == asked[1]).all()

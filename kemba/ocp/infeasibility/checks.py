@@ -305,7 +305,7 @@ STROKES = 3  # pushes in one motion, as none has more; a task that needs more en
 
 
 def _time(task: Task, flight: AskedFlight, document: Document) -> Iterator[Diagnostic]:
-    """GroundRise to the apex and fall from it within the longest steps allowed."""
+    """Rise to the apex and fall from it within the longest steps allowed."""
     longest = task.duration * (1 + task.step_variation)
     before = longest * (flight.requirement.at or 0.0)
     spans = []

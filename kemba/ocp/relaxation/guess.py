@@ -351,7 +351,9 @@ def _foot(
             x += way * swing
         bump = LIFT + max(0.0, float((over / inside).max()))
         z += rise * swing + bump * np.sin(np.pi * swing) ** 2
-    return np.column_stack([x, np.minimum(z, hips[:, 1] - reach[0])])  # folded, at most
+    if task.scene.cornered:  # folded, at most; where a body turns over, feet are above their hips
+        z = np.minimum(z, hips[:, 1] - reach[0])
+    return np.column_stack([x, z])
 
 
 def _cycloid(share: Array) -> Array:

@@ -38,7 +38,8 @@ class Ends:
     tol = 1e-3  # IPOPT's tolerance while valves are sought; these plans are changed again
     exact_tol = 1e-2  # IPOPT's tolerance of the last solve: a few digits of the cost
     relax_iterations = 600  # limit of the first solve; where there is a plan it takes 30 to 200
-    # limit of each later one while valves are sought: 30 to 300 are usual, beside walls up to 700
+    # limit of each later one while valves are sought: beside walls those that lead to a plan take
+    # up to 700
     valve_iterations = 800
     misfit_iterations = 200  # the same on a finer grid; valves that fit take 20 to 100
     # iterations without a smaller violation, after which a finer grid's valves do not fit

@@ -34,8 +34,6 @@ from kemba.quantity import Quantity, to_si
 SPECIAL = ("rest", "settled")
 AIR = 0.2  # of a force's scale, 20 N: what an edge half a step away changes
 UNREFINED = "needs the refined plan, and this task says refine: none"
-
-
 ALONE = ("contacts", "periodic")  # templates that need no goal
 
 
