@@ -76,6 +76,21 @@ def test_columns_are_read(fill: Callable[[h5py.File], None], ending: str, tmp_pa
         np.testing.assert_allclose(back[name][good], expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("ending", [".h5", ".tdms"])
+def test_a_unit_behind_the_name_of_a_clock_counts(ending: str, tmp_path: Path) -> None:
+    """At 50 kHz, where its steps would be usual ones of another unit."""
+    nptdms = pytest.importorskip("nptdms")
+    path, columns = tmp_path / f"log{ending}", {"Time [ms]": 0.02 * np.arange(400.0), **COLUMNS}
+    del columns["time"]
+    if ending == ".h5":
+        with h5py.File(path, "w") as file:
+            file.update({f"run/{name}": values for name, values in columns.items()})
+    else:
+        with nptdms.TdmsWriter(path) as writer:
+            writer.write_segment([nptdms.ChannelObject("run", n, v) for n, v in columns.items()])
+    assert draft_map(path, ("front", "rear"), 0.07).columns["time [s]"]["unit"] == "ms"
+
+
 def test_what_has_no_clock_is_left_out_and_said(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "log.h5", "w") as file:
         two_rates(file)

@@ -260,6 +260,18 @@ def test_json_of_rows_is_read(form: str, tmp_path: Path) -> None:
     assert np.isnan(q[3]) and q[4] == pytest.approx(0.4) and len(q) == 80
 
 
+@pytest.mark.parametrize("dated", [True, False])
+def test_json_split_by_pandas_is_read(dated: bool, tmp_path: Path) -> None:
+    path, frame = plain_log(tmp_path, {"note": "on"} if dated else {})
+    path = path.with_suffix(".json")
+    frame.to_json(path, orient="split", double_precision=15)
+    draft = draft_map(path, ("front", "rear"), 0.07)
+    assert not draft.missing and not draft.questions
+    path.write_text('{"columns": ["time", "body_z"]}')
+    with pytest.raises(KembaError, match=r"is no JSON of columns or rows$"):
+        reader(path)(path)
+
+
 @pytest.mark.parametrize("mark", ["#N/A", "n/a", "<NA>", "--", "#DIV/0!"])
 def test_marks_of_missing_readings(mark: str, tmp_path: Path) -> None:
     path, frame = plain_log(tmp_path)

@@ -41,7 +41,7 @@ def test_a_factor_before_or_behind_a_sign_is_part_of_the_unit(unit: str) -> None
     assert named_unit(f"pitch [{unit}]") == ("pitch", unit)
 
 
-@pytest.mark.parametrize("text", ["'", '"', "1/100", "10^-3", "counts"])
+@pytest.mark.parametrize("text", ["'", '"', "1/100", "10^-3", "counts", "°_10"])
 def test_what_looks_like_a_unit_and_is_none_is_told(text: str) -> None:
     assert named_unit(f"hip [{text}]")[1] is None and strange_unit(f"hip [{text}]", ()) == text
 

@@ -17,8 +17,8 @@ WORDS: dict[str, dict[str, str]] = {
     "part": {
         "hip": "hip hips motor qdd huefte hüfte hüft hueft hüftgelenk qm tm hanche cadera anca "
         "股関節 髋 髋关节",
-        "piston": "piston cylinder cyl knee rod actuator kolben zylinder zyl xp fp vérin verin "
-        "cilindro シリンダ シリンダー 气缸",
+        "piston": "piston pistons cylinder cylinders cyl knee rod actuator kolben zylinder zyl xp "
+        "fp vérin verin cilindro シリンダ シリンダー 气缸",
         "body": "body base torso trunk com boom imu pelvis rumpf floating corps cuerpo corpo tronc "
         "胴体 机身",
         "foot": "foot feet toe grf ground fuss fuß pied pie piede 足",
@@ -274,14 +274,17 @@ def _is_usual(head: str, tail: str) -> bool:
 
 def is_unit(text: str, indexed: bool = False) -> bool:
     """Whether a text is a unit; `indexed`: a bare number is the place in an array."""
-    lettered = any(sign.isalpha() or sign in "°%" for sign in text)
-    if not lettered and (indexed or text != "1"):
+    if not _lettered(text) and (indexed or text != "1"):
         return False
     try:
         parse_unit(text)
     except ValueError:
         return False
     return True
+
+
+def _lettered(text: str) -> bool:
+    return any(sign.isalpha() or sign in "°%" for sign in text)
 
 
 def strange_unit(name: str, legs: Sequence[str]) -> str | None:
@@ -291,7 +294,7 @@ def strange_unit(name: str, legs: Sequence[str]) -> str | None:
     for match in BRACKETS.finditer(name):
         text = (match[1] or match[2] or "").strip()
         marked = bool(UNIT_MARK.fullmatch(text))
-        if not (marked or any(map(str.isalpha, text))) or named_unit(name)[1] is not None:
+        if not (marked or _lettered(text)) or named_unit(name)[1] is not None:
             continue
         if marked or unknown(text, legs):
             return text

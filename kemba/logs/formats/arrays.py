@@ -17,6 +17,7 @@ import numpy as np
 from kemba.errors import KembaError
 from kemba.files import atomic_path, plain
 from kemba.files import write_json as write_json_file
+from kemba.logs.draft.words import named_unit
 from kemba.logs.formats import check_size, missing
 from kemba.logs.recording import Column, Group, Raw, Recording, by_length, is_clock, recording, some
 from kemba.logs.times import seconds
@@ -69,10 +70,16 @@ def read_json(path: Path) -> Recording:
         text = path.read_text(encoding="utf-8")
         content = _rows(text) or _content(text)
         columns = content.get("columns", content)
+        if not isinstance(columns, dict):  # pandas: orient="split"
+            columns = {
+                str(n): _array(list(v)) for n, v in zip(columns, content["data"].T, strict=True)
+            }
         found = {k: _array(v) for k, v in columns.items() if isinstance(v, list | np.ndarray)}
     except OSError as error:
         raise KembaError(str(path), error.strerror or str(error)) from None
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
+    except (KeyError, AttributeError):
+        raise KembaError(str(path), "is no JSON of columns or rows") from None
+    except (ValueError, TypeError, RecursionError) as error:
         raise KembaError(str(path), f"is no JSON of columns or rows: {error}") from None
     meta = content.get("meta", {})
     return replace(vectors(found, path), meta=meta if isinstance(meta, dict) else {})
@@ -199,6 +206,8 @@ def _array(values: list[Any] | Column) -> Column:
     try:
         return np.array(values, dtype=float)
     except (ValueError, TypeError):  # texts, some of them missing
+        if all(isinstance(value, list) for value in values):
+            return np.array(values, dtype=object)
         return np.array(["" if value is None else str(value) for value in values])
 
 
@@ -285,7 +294,7 @@ def read_h5(path: Path) -> Recording:
         return replace(found, units={n: u for n, u in index["units"].items() if n in found.columns})
     groups: dict[str, Group] = {}
     for parent, clock in clocks.items():
-        unit = index["units"].get(clock, "")
+        unit = index["units"].get(clock) or named_unit(clock)[1] or ""
         groups[parent] = Group(parent, loose.pop(clock), unit, {})
     left = []
     for name, array in loose.items():

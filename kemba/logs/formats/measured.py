@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from kemba.errors import KembaError
+from kemba.logs.draft.words import named_unit
 from kemba.logs.formats import check_size
 from kemba.logs.recording import (
     TIME_WORD,
@@ -149,7 +150,8 @@ def _plain(plain: Raw, units: dict[str, str], name: str, said: list[str]) -> Ite
         return
     time = plain[clocks[0]]
     stamps = time.astype("datetime64[ns]").astype(np.int64) if time.dtype.kind == "M" else time
-    unit = "ns" if time.dtype.kind == "M" else units.get(clocks[0], "")
+    named = units.get(clocks[0]) or named_unit(clocks[0])[1] or ""
+    unit = "ns" if time.dtype.kind == "M" else named
     columns = {n: v for n, v in plain.items() if n != clocks[0] and len(v) == len(time)}
     if short := [n for n in plain if n != clocks[0] and n not in columns]:
         said.append(f"left out, since they are not as long as {clocks[0]}: {some(short)}")
