@@ -36,7 +36,12 @@ from kemba.identify.robot.linear import ForceDensity, first_reference
 from kemba.identify.robot.mix_ups import Left, in_flight, mixed_up
 from kemba.identify.robot.physics import Physics
 from kemba.identify.robot.state import learnt_from, linearise_at
-from kemba.identify.robot.validate import contradictions, mixed_commands, slightly_mixed_up
+from kemba.identify.robot.validate import (
+    contradictions,
+    mixed_commands,
+    slightly_mixed_up,
+    turned_torques,
+)
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
 
@@ -230,6 +235,7 @@ class RobotProblem(RobotForces):
         if not faults:
             r, rows = self.residual(self.lengths), self.rows()
             faults = list(mixed_commands(self.state, rows, r, self._left(self.physics)))
+            faults = faults or list(turned_torques(self.state, rows, r))
             faults = faults or list(contradictions(self.state, rows, r, self._sensor_columns))
         if faults:
             raise BadData(faults)

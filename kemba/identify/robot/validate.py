@@ -5,6 +5,7 @@ residual of the whole log along the same measured motion.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -30,6 +31,7 @@ HINT = "correct it in a column map (--map)"
 BETTER = 2.0  # factor by which a log must err less without a mistake about its commands
 WHOLE = 1.2  # what the model leaves of a flight whose columns are right: zeros leave more
 NOISE = 0.75  # what it leaves of a log of a model that is complete
+TURNED, SURE = -0.25, 3.0  # gain of torques that are turned: missing effects leave 0.5; in sigmas
 SLIGHT = 0.1  # share of the error with it that tells nothing: the motion was smoothed with it
 
 
@@ -68,6 +70,27 @@ def mixed_commands(
             return
 
 
+def turned_torques(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
+    """Hip torques from whose opposite the motion follows, run by run: the residual r (n,) is least
+    at a negative gain of theirs. That tells what moves a jump by too little for `BETTER`."""
+    legs, logs, shares = state.physics.legs, state.batch.resampled, []
+    for i in range(len(legs)):
+        sign = np.where(np.arange(len(legs)) == i, -1.0, 1.0)
+        turned = tuple(replace(log, torque=sign * log.torque) for log in logs)
+        shares.append(0.5 * (state.commanded(Batch(turned)) - r))
+    share = np.stack(shares, axis=1)
+    for i, log in enumerate(logs):
+        d, own = share[rows.run == i], r[rows.run == i]
+        gain = 1.0 - np.linalg.lstsq(d, -own, rcond=None)[0]
+        spread = rms(own) * np.sqrt(np.diag(np.linalg.pinv(d.T @ d)))
+        wrong = np.flatnonzero(gain + SURE * spread < TURNED)
+        if len(wrong):
+            each = " and ".join(f"the {legs[k]} leg" for k in wrong)
+            whose = "every leg" if len(wrong) == len(legs) > 1 else each
+            least = f"the motion follows from {gain[wrong].min():.2f} times these torques"
+            yield KembaError(log.name, f"hip/tau of {whose} has the reversed sign", least, HINT)
+
+
 def slightly_mixed_up(
     physics: Physics, logs: Sequence[ResampledLog], left: Left
 ) -> Iterator[KembaError]:
@@ -84,7 +107,7 @@ def slightly_mixed_up(
             least = min(told.values())
             said = "; or ".join(text for text, error in told.items() if error <= SAME * least)
             what = (
-                f"the log errs by {as_read[i]:.2g} times its noise, and by {least:.2g} times then"
+                f"the log errs by {as_read[i]:.3g} times its noise, and by {least:.3g} times then"
             )
             yield KembaError(log.name, said, what, HINT)
 

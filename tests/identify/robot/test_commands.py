@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from robot_logs import hops
+from twin.measure import Sensors
 
 from kemba.identify.logs.gate import BadData
 from kemba.identify.logs.reading import read_log
@@ -77,6 +78,19 @@ def test_pistons_in_another_unit_hardly_move_feet_of_legs_that_stand_drawn_in() 
     read = {f"{leg}/piston/x": log[f"{leg}/piston/x"] / 10.0 for leg in LEGS}
     with pytest.raises(BadData, match="hop0: piston/x of every leg is 10 times too small"):
         problem(taken(log, read)).validate()
+
+
+@pytest.mark.parametrize(("legs", "whose"), [(LEGS, "every leg"), (LEGS[1:], "the rear leg")])
+def test_turned_torques_that_hardly_show_are_told_by_their_gain(
+    legs: tuple[str, ...], whose: str
+) -> None:
+    """As of a jump, whose hips work little; no wrong gain or inertia is named instead."""
+    (log,), _ = hops(runs=1, seed=1, sensors=Sensors(noise=40.0))
+    problem(log).validate()
+    turned = {f"{leg}/hip/tau": -log[f"{leg}/hip/tau"] for leg in legs}
+    words = f"hop0: hip/tau of {whose} has the reversed sign; the motion follows from -"
+    with pytest.raises(BadData, match=words):
+        problem(taken(log, turned)).validate()
 
 
 def test_two_mistakes_about_commands(logs: list[Trajectory]) -> None:
