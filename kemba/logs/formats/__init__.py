@@ -31,6 +31,7 @@ UNREAD = {  # endings of files that are not read: what they are, and the way out
     "feather arrow": ("an Arrow file", "write its table as Parquet"),
     "xlsx xls xlsm ods": ("a workbook", "save its sheet as CSV"),
     "blf": ("a log of CAN frames", "decode it with its DBC file into MDF, as asammdf does"),
+    "rrd": ("a recording of Rerun", "take the log that it was made of"),
     "pkl pickle": ("a file of Python objects, which run code when read", "write it as Parquet"),
     "zip gz bz2 zst 7z tar": ("packed", "unpack it"),
 }
