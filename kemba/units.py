@@ -156,10 +156,10 @@ def si_name(unit: pint.Unit) -> str:
 
 def called_dimension(unit: pint.Unit) -> str:
     """The everyday name of a unit's dimension with its article: `a length`."""
-    for known, (name, _) in NAMES.items():
-        if parse_unit(known).dimensionality == unit.dimensionality:
-            return f"an {name}" if name[0] in "aeiou" else f"a {name}"
-    return f"in {unit:~C}"
+    name, _ = NAMES.get(si_name(unit), ("", ""))
+    if not name:
+        return f"in {unit:~C}"
+    return f"an {name}" if name[0] in "aeiou" else f"a {name}"
 
 
 def is_unit(text: str) -> bool:

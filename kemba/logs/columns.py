@@ -81,8 +81,8 @@ class ColumnMap(Section):
     Columns that it does not name are ignored, whatever they hold.
     """
 
-    kind: str | None = Field(
-        None, description="robot, bench, cylinder, drive or vessel; else by columns"
+    kind: Literal["robot", "bench", "cylinder", "drive", "vessel"] | None = Field(
+        None, description="of log; else by columns"
     )
     notes: str = ""
     separator: str = Field(",", min_length=1, description="`;`, `tab`, `whitespace`, ...")
