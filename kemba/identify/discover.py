@@ -267,6 +267,7 @@ def _answer(
     )
     answer.remarks = list(caveats.reasons)
     if verdict == "partly":
-        answer.rest, answer.next = rest_of(search, best, [e for e in named if e not in sure])
+        doubted = [e for e in named if e not in sure]
+        answer.rest, answer.next = rest_of(search, whole or best, doubted)
     answer.sentence = phrase(answer)
     return answer

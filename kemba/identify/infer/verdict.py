@@ -353,7 +353,7 @@ def rest_of(search: Search, best: Hypothesis, unsure: Collection[str]) -> tuple[
     bins = sorted(conditions(problem, theta), key=lambda b: -b.ratio)
     worst = [f"{place_of(b)} ({short(b.ratio)} times the noise)" for b in bins if b.significant][:1]
     channel = profiles[0].channel if law else bins[0].channel if worst else ""
-    rest = "; ".join([*worst, *law]) or "no condition in particular"
+    rest = "; ".join([*worst, *law])
     if unsure:
         named = " and ".join(unsure)
         told = f"'kemba-opt experiment' proposes a test that tells {named} from what looks alike"

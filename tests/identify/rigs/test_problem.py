@@ -1,13 +1,17 @@
 """What a rig's model lacks, and the period of a cogging axis, are read from numbers that are
 known."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from kemba.config import dump_yaml
 from kemba.identify.rigs.problem import RigProblem, _strongest_period
+from kemba.identify.workflow import discover_logs
+from kemba.trajectory import Trajectory
 
 
 def test_what_a_model_lacks_is_noise_of_all_rows() -> None:
@@ -37,3 +41,22 @@ def test_the_strongest_period_has_its_phase(phase: float) -> None:
     assert period == pytest.approx(0.1, rel=0.03)
     # the period is one of a grid: over the travel from -1 to 1 its phase is off where q is not 0
     assert found == pytest.approx(phase, abs=0.2)
+
+
+def test_what_is_left_is_said_of_the_answer_whose_error_is_quoted(tmp_path: Path) -> None:
+    """A pendulum whose rotor is lighter than the model has it: a part of the answer leaves much."""
+    t, q, v, rows = np.arange(0.0, 6.0, 1e-4), 0.0, 2.0, []
+    force = 1.2 * np.sin(1.4 * np.pi * t)
+    for tau in force:
+        rows.append(q)
+        v += 1e-4 * (tau - 0.589 * np.sin(q) - 0.01 * v - 0.08 * np.tanh(v / 0.1)) / 0.02
+        q += 1e-4 * v
+    t, force, read = t[::10], force[::10], np.array(rows[::10])
+    read += 2e-4 * np.random.default_rng(3).standard_normal(len(t))
+    columns = {"axis/q [rad]": read, "axis/tau [N.m]": force}
+    Trajectory(t, columns, {"kind": "drive"}).write(tmp_path / "log.csv")
+    rig = {"kind": "drive", "motion": "rotary", "inertia": "0.02 kg.m2"}
+    rig |= {"load": {"mass": "0.5 kg", "arm": "0.12 m"}}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), str(tmp_path / "model.yaml"))
+    assert answer.error_after < 1.2 and "Still unexplained" not in answer.sentence
