@@ -276,7 +276,7 @@ def _remarks(log: Trajectory) -> Iterator[str]:
         step, share = rate_missing(log.time, log[column])
         missing = round(share * (1 + (log.time[-1] - log.time[0]) / step))
         if missing:
-            yield f"{name}: {column}: {missing} readings missing"
+            yield f"{name}: {column}: {missing} reading{'s' * (missing > 1)} missing"
 
 
 def unit_in_doubt(x: Array, stroke: float) -> str:

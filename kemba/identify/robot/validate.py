@@ -5,7 +5,6 @@ residual of the whole log along the same measured motion.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -73,22 +72,26 @@ def mixed_commands(
 def turned_torques(state: LinearisedState, rows: Rows, r: Array) -> Iterator[KembaError]:
     """Hip torques from whose opposite the motion follows, run by run: the residual r (n,) is least
     at a negative gain of theirs. That tells what moves a jump by too little for `BETTER`."""
-    legs, logs, shares = state.physics.legs, state.batch.resampled, []
-    for i in range(len(legs)):
-        sign = np.where(np.arange(len(legs)) == i, -1.0, 1.0)
-        turned = tuple(replace(log, torque=sign * log.torque) for log in logs)
-        shares.append(0.5 * (state.commanded(Batch(turned)) - r))
-    share = np.stack(shares, axis=1)
+    physics, logs = state.physics, state.batch.resampled
+    left = {
+        m: state.commanded(Batch(tuple(corrected(log, physics, [m]) for log in logs)))
+        for m in command_mix_ups(physics.legs)
+        if all(name.endswith("hip/tau") for name in m.about)
+    }
+    legs = [other for m, other in left.items() if len(m.about) == 1]
+    share = 0.5 * (np.stack(legs, axis=1) - r[:, None])
     for i, log in enumerate(logs):
-        d, own = share[rows.run == i], r[rows.run == i]
-        gain = 1.0 - np.linalg.lstsq(d, -own, rcond=None)[0]
-        spread = rms(own) * np.sqrt(np.diag(np.linalg.pinv(d.T @ d)))
-        wrong = np.flatnonzero(gain + SURE * spread < TURNED)
-        if len(wrong):
-            each = " and ".join(f"the {legs[k]} leg" for k in wrong)
-            whose = "every leg" if len(wrong) == len(legs) > 1 else each
-            least = f"the motion follows from {gain[wrong].min():.2f} times these torques"
-            yield KembaError(log.name, f"hip/tau of {whose} has the reversed sign", least, HINT)
+        own = rows.run == i
+        d, before = share[own], rms(r[own])
+        gain = 1.0 - np.linalg.lstsq(d, -r[own], rcond=None)[0]
+        spread = before * np.sqrt(np.diag(np.linalg.pinv(d.T @ d)))
+        if np.any(gain + SURE * spread < TURNED):
+            after = {m.text: rms(other[own]) for m, other in left.items()}
+            least = min(after.values())
+            most = np.hypot(least, SLIGHT * before)
+            said = "; or ".join(text for text, error in after.items() if error <= most)
+            what = f"the log errs by {before:.3g} times its noise, and by {least:.3g} times then"
+            yield KembaError(log.name, said, what, HINT)
 
 
 def slightly_mixed_up(

@@ -367,8 +367,8 @@ def _records(stream: Any, path: Path, said: list[str]) -> Iterator[Any]:
         raise
     except Exception as error:  # of damaged bytes the library raises anything
         if not ended:
-            why = f"{type(error).__name__}: {error}"[:120]
-            said.append(f"it breaks off after {count} messages, which are read ({why})")
+            why = f" ({error})"[:120] if str(error) else ""
+            said.append(f"it breaks off after {count} messages, which are read{why}")
         return
     if not ended:
         said.append(f"it breaks off after {count} messages, which are read")
