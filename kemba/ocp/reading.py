@@ -160,7 +160,9 @@ def as_one(
     begin = 0
     for part, own in parts:
         model, asked = asked_of(part, own, lags=lags)
-        requirements += _moved(asked, begin / nodes, part.nodes / nodes)
+        moved = _moved(asked, begin / nodes, part.nodes / nodes)
+        known = {_said(r, nodes) for r in requirements}
+        requirements += [r for r in moved if _said(r, nodes) not in known]
         for stance, (a, b) in zip(part.contacts, spans(part.contacts), strict=True):
             share = (b - a) * part.nodes / nodes
             if contacts and contacts[-1].on == stance.on:
@@ -187,12 +189,21 @@ def _moved(asked: Sequence[Requirement], begin: float, share: float) -> Iterator
         ahead = begin > 0.0 and r.quantity.name.endswith(AHEAD) and r.minus is None
         if ahead and r.at == 0.0 and r.quantity.name == "body/x":
             continue  # where a motion begins
+        if begin > 0.0 and r.location == ("start", "settled"):
+            continue  # air is settled after a while of rest only
         minus = r.minus and replace(r.minus, at=at(r.minus.at))
         if ahead and r.at is not None:
             minus = Earlier("body/x", begin)
         moment = None if r.at is None else at(r.at)
         during = at(r.during[0]), at(r.during[1])
         yield replace(r, at=moment, during=during, minus=minus)
+
+
+def _said(asked: Requirement, nodes: int) -> tuple[object, ...]:
+    """What a requirement says, wherever: two motions that meet may say the same of their state."""
+    during = None if asked.at is not None else asked.during
+    at = None if asked.at is None else asked.node(nodes)
+    return at, during, asked.quantity.name, asked.lower, asked.upper, asked.aim, asked.minus
 
 
 AHEAD = ("body/x", "foot/x", "hip/x", "knee/x")  # what a motion before has moved on

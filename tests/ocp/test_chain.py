@@ -10,7 +10,7 @@ from kemba.errors import KembaError
 from kemba.ocp import load_task
 from kemba.ocp.planning import check_feasible
 from kemba.ocp.reading import as_one, joined, motions
-from kemba.ocp.task.requirement import Requirement
+from kemba.ocp.task.requirement import Requirement, landing_nodes
 from kemba.trajectory import Trajectory
 
 
@@ -69,6 +69,26 @@ def test_what_a_motion_asks_is_asked_in_its_own_share_of_the_sequence(tmp_path: 
     _, _, asked = as_one(*load_task(tmp_path / "own.yaml"))
     halves = [(begin + end / 2) for begin in (0.0, 0.5) for end in sorted({*moments(alone)})]
     assert sorted({*moments(asked)}) == pytest.approx(sorted({*halves}))
+
+
+def test_motions_that_meet_at_rest_ask_for_it_once_and_for_no_settled_air(tmp_path: Path) -> None:
+    """Two equal rows have no unique multipliers, and forces of air only tend to those of rest."""
+    tmp_path.joinpath("own.yaml").write_text("sequence: [{motion: jump_forward.yaml, repeat: 2}]\n")
+    task, _, asked = as_one(*load_task(tmp_path / "own.yaml"))
+    there = [r for r in asked if r.at is not None and r.node(task.nodes) == task.nodes // 2]
+    assert [r.quantity.name for r in there].count("body/vx") == 1
+    assert {r.location for r in asked if r.at == 0.0} >= {("start", "settled"), ("start", "rest")}
+    assert not [r for r in there if r.location == ("start", "settled")]
+
+
+def test_each_motion_of_a_sequence_has_its_landing(tmp_path: Path) -> None:
+    """The push of a second jump is not the landing of the first."""
+    tmp_path.joinpath("own.yaml").write_text("sequence: [{motion: jump_forward.yaml, repeat: 2}]\n")
+    alone, _ = load_task("jump_forward.yaml")
+    own = landing_nodes(check_feasible(*load_task("jump_forward.yaml"))[1], alone.nodes)
+    task, _, asked = as_one(*load_task(tmp_path / "own.yaml"))
+    assert own[-1] == alone.nodes and own[0] > alone.nodes // 3
+    assert landing_nodes(asked, task.nodes) == [*own, *(alone.nodes + k for k in own)]
 
 
 def moments(requirements: Sequence[Requirement]) -> list[float]:

@@ -12,7 +12,7 @@ from kemba.model import Model, load_model
 from kemba.ocp import Task, load_task, task_model
 from kemba.ocp.phases.modes import HELD, OPEN, drop_grazes
 from kemba.ocp.planned import grazes, not_clear
-from kemba.ocp.task.requirement import Requirement, apex_node
+from kemba.ocp.task.requirement import Requirement, landing_nodes
 from kemba.ocp.task.resolve import resolve
 from kemba.ocp.task.templates import longest_leg
 from kemba.ocp.transcription.symmetry import whole
@@ -112,11 +112,11 @@ def test_impacts_of_the_landing_are_slow() -> None:
     """By hand: the speed of every gap in the row before it closes, after the apex."""
     run = solved("jump")
     assert run.task.landing.impact_speed == 0.8
-    after = apex_node(resolved_of(run), len(run.plan) - 1)
+    landing = landing_nodes(resolved_of(run), len(run.plan) - 1)
     leg = felt(run.model.mechanism, "front/end_stop:retracted")
     for name, factor in (("front/foot/z", 1.0), ("rear/piston/x", leg)):
         gap, time = run.plan[name], run.plan.time
-        hits = [k for k in range(after + 1, len(gap)) if gap[k] < 1e-7 < gap[k - 1]]
+        hits = [k for k in landing if gap[k] < 1e-7 < gap[k - 1]]
         assert hits, name
         for k in hits:
             before = (gap[k - 2] - gap[k - 1]) / (time[k - 1] - time[k - 2])

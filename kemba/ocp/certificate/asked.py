@@ -19,7 +19,7 @@ from kemba.events import LASTS, PLANNED, read
 from kemba.mechanism.knee import felt
 from kemba.model import Model
 from kemba.ocp.task.expressions import along
-from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
+from kemba.ocp.task.requirement import SCALES, Requirement, landing_nodes, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.course import begin_ways, cubic
 from kemba.ocp.transcription.solution import arrays
@@ -259,7 +259,7 @@ def _of_the_task(
         # an implicit Euler plan switches at nodes, whose steps vary
         yield of("min_dwell", dwell, task.min_dwell, inf, loose=task.step * euler)
     if task.landing.impact_speed is not None:
-        speed, node = _fastest_impact(model, plan, apex_node(requirements, last))
+        speed, node = _fastest_impact(model, plan, landing_nodes(requirements, last))
         # an implicit Euler plan knows the speed of an impact to what gravity adds in a step
         most, loose = task.landing.impact_speed, EULER_SPEED * euler
         yield of("landing.impact_speed", speed, -inf, most, "m.s-1", node, loose)
@@ -302,15 +302,15 @@ def _shortest_dwell(model: Model, plan: Trajectory) -> float | None:
     return float(min(found)) if found else None
 
 
-def _fastest_impact(model: Model, plan: Trajectory, apex: int) -> tuple[float, int]:
-    """The largest speed [m/s] of feet and stops that close after the node `apex`, and its node."""
+def _fastest_impact(model: Model, plan: Trajectory, nodes: list[int]) -> tuple[float, int]:
+    """The largest speed [m/s] of feet and stops that close at some nodes, and its node."""
     node, x = model.node, arrays(model, plan)
     speed, at = 0.0, len(plan) - 1
     for constraint in rigid_constraints(model, whole(node)):
         f = ca.Function("gap", [node.q, node.v], [constraint.gap, constraint.rate])
         gap, rate = (np.array(part).ravel() for part in f.map(len(plan))(x["q"].T, x["v"].T))
         closes = np.flatnonzero((gap[:-1] > CLOSED) & (gap[1:] <= CLOSED)) + 1
-        for k in closes[closes > apex]:
+        for k in closes[np.isin(closes, nodes)]:
             if "phases" not in plan.meta:  # implicit Euler: the rate that the step stopped
                 rate[k] = rate[k - 1]
             own = -felt(model.mechanism, constraint.label) * float(rate[k])

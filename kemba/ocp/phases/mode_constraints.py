@@ -13,7 +13,7 @@ from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN
 from kemba.ocp.phases.program import PhaseProgram, View, Where
 from kemba.ocp.phases.radau import STATE
 from kemba.ocp.phases.settings import ModeConstraints
-from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
+from kemba.ocp.task.requirement import SCALES, Requirement, landing_nodes, quantity_expression
 from kemba.ocp.transcription.first_node import state_rows
 from kemba.ocp.transcription.stage import aim_cost, as_variable, tighter_bounds
 from kemba.ocp.transcription.unilateral import Constraint
@@ -137,7 +137,7 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     hits = {n: (p, np.concatenate([c.end(n)["q"], c.end(n)["v"]])) for n, p in closing.items()}
     soft = program.task.landing.impact_speed
     if soft is not None:
-        late = [at for node, at in hits.items() if node > program.apex]
+        late = [at for node, at in hits.items() if node in program.landing]
         own = felt(program.model.mechanism, constraint.label)
         program.mode_constraint(i, "lands", view.z("q v"), own * rate, -soft / SPEED, INF, late)
     program.mode_constraint(i, "touch", view.z("q"), g, 0.0, 0.0, touching)
@@ -270,7 +270,7 @@ def add_requirements(
     """Bounds where a requirement is about a variable, else rows; none where modes imply it."""
     view = View(program)
     program.requirements = requirements
-    program.apex = apex_node(requirements, program.nodes)
+    program.landing = landing_nodes(requirements, program.nodes)
     granted = _granted_at_end(program, view, end)
     tied = {r.quantity.name for r in requirements if r.minus and (r.minus.at, r.at) == (0.0, 1.0)}
     for expression in granted:  # what is closed at the end of a stride is closed at its start

@@ -175,7 +175,7 @@ class PhaseProgram:
         self.jump = impact(model, self.layout, reduction)
         self.added: list[PhasePart] = []
         self.requirements: Sequence[Requirement] = ()
-        self.apex = 0  # the node after which impacts are those of the landing
+        self.landing: list[int] = []  # the nodes at which impacts are those of a landing
 
     def closes(self, p: int, i: int) -> bool:
         """Whether constraint i was open before phase p and is closed in it."""

@@ -127,14 +127,22 @@ def quantity_expression(model: Model, name: str) -> ca.SX:
 
 
 def highest(requirements: Sequence[Requirement]) -> Requirement | None:
-    """The goal, or without one the end, that asks for the greatest height of the body, or None."""
+    """The goal, or without one the end, that asks for the greatest height of the body, the last of
+    several; or None."""
     heights = (w for w in requirements if w.quantity.name == "body/z" and w.minus is None)
     high = [w for w in heights if w.at and w.lower > -math.inf]
     goals = [w for w in high if w.location[0] == "goals"]
-    return max(goals or high, key=lambda w: w.lower, default=None)
+    return max(reversed(goals or high), key=lambda w: w.lower, default=None)
 
 
-def apex_node(requirements: Sequence[Requirement], nodes: int) -> int:
-    """The node of the highest goal of the body, after which it lands; 0 without such a goal."""
-    apex = highest(requirements)
-    return 0 if apex is None else apex.node(nodes)
+def landing_nodes(requirements: Sequence[Requirement], nodes: int) -> list[int]:
+    """The nodes of the landings: those after the highest goal of the body, or all without one; of a
+    sequence those of each motion, which ends where its `end` is asked for."""
+    ends = {r.node(nodes) for r in requirements if r.location[0] == "end"} | {nodes}
+    found, begin = list[int](), 0
+    for end in sorted(ends):
+        own = [r for r in requirements if r.at is not None and begin < r.node(nodes) <= end]
+        apex = highest(own)
+        found += range((begin if apex is None else apex.node(nodes)) + 1, end + 1)
+        begin = end
+    return found

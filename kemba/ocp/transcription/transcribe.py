@@ -25,7 +25,7 @@ import numpy as np
 from kemba.mechanism.knee import felt
 from kemba.model import Model
 from kemba.ocp.functions.blocks import RowBlock, block_problem
-from kemba.ocp.task.requirement import SCALES, Requirement, apex_node, quantity_expression
+from kemba.ocp.task.requirement import SCALES, Requirement, landing_nodes, quantity_expression
 from kemba.ocp.task.task import Task
 from kemba.ocp.transcription.first_node import granted, state_rows
 from kemba.ocp.transcription.layout import STEP, Layout
@@ -231,7 +231,7 @@ class Transcription:
             return []
         step = self.task.duration / self.nodes
         rows = approach_rows(self.model, self.reduction, stage, self.of_state, speed, step)
-        where = list(range(apex_node(self.requirements, self.nodes) + 1, self.nodes + 1))
+        where = landing_nodes(self.requirements, self.nodes)
         if not where:  # the motion ends at the apex
             return []
         both = np.hstack([index[:-1, :n], index[1:, :n]])[np.array(where) - 1]
