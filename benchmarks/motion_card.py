@@ -57,8 +57,7 @@ def stride(rng: random.Random) -> tuple[dict[str, Any], str]:
 def chain(rng: random.Random) -> tuple[dict[str, Any], str]:
     """Two jumps in a row, each as far ahead."""
     task, ahead = shipped("tasks", "double_jump"), round(rng.uniform(0.1, 0.3), 3)
-    task["distance"] = 2 * ahead
-    task["goals"]["between"] |= {"at_least": ahead - 0.02, "at_most": ahead + 0.02}
+    task["sequence"][0]["set"] |= {"distance": f"{ahead} m"}
     return task, f"2 x {ahead:.2f} m"
 
 
@@ -87,7 +86,7 @@ def drawn(kind: str, seed: int, number: int, folder: Path) -> tuple[Path, str]:
         length = float(robot["leg"][part][key].removesuffix(" m"))
         robot["leg"][part][key] = f"{longer * length:.4f} m"
     dump_yaml(robot, folder / "robot.yaml")
-    dump_yaml({"base": task["model"], "robot": "robot.yaml"}, folder / "own.yaml")
+    dump_yaml({"base": task.get("model", "planning"), "robot": "robot.yaml"}, folder / "own.yaml")
     file = folder / f"{kind}.yaml"
     dump_yaml(task | {"model": "own.yaml"}, file)
     figures = f"{task['supply']}, {task['payload']}, legs x {longer:.2f}"
