@@ -8,7 +8,8 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.ocp import load_task
-from kemba.ocp.planning import check_feasible
+from kemba.ocp.certificate.status import Status
+from kemba.ocp.planning import check_feasible, plan
 from kemba.ocp.reading import as_one, joined, motions
 from kemba.ocp.task.requirement import Requirement, landing_nodes
 from kemba.trajectory import Trajectory
@@ -89,6 +90,14 @@ def test_each_motion_of_a_sequence_has_its_landing(tmp_path: Path) -> None:
     task, _, asked = as_one(*load_task(tmp_path / "own.yaml"))
     assert own[-1] == alone.nodes and own[0] > alone.nodes // 3
     assert landing_nodes(asked, task.nodes) == [*own, *(alone.nodes + k for k in own)]
+
+
+@pytest.mark.slow  # a minute of CPU
+def test_two_jumps_ahead_in_a_row_are_one_refined_plan(tmp_path: Path) -> None:
+    tmp_path.joinpath("own.yaml").write_text("sequence: [{motion: jump_forward.yaml, repeat: 2}]\n")
+    found = plan(*load_task(tmp_path / "own.yaml"))
+    assert found.status is Status.SOLVED and found.refined
+    assert found.trajectory["body/x"][-1] == pytest.approx(0.6)
 
 
 def moments(requirements: Sequence[Requirement]) -> list[float]:
