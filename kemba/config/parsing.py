@@ -29,11 +29,12 @@ def parse(document: Document | Mapping[str, Any], schema: type[Schema]) -> Schem
         raise ConfigErrors(complaints(error, document, schema)) from None
 
 
-def apply_overrides(document: Document, options: Iterable[str]) -> Document:
+def apply_overrides(document: Document, options: Iterable[str], place: str = "") -> Document:
     """A copy of the document with `--set` options such as `goals.apex=0.5 m` applied.
 
     Values are YAML. A plain value for a group of `equals`, `at_least` or `at_most` means `equals`;
-    the rest of the group is kept. `parse` checks whether the keys exist.
+    the rest of the group is kept. `parse` checks whether the keys exist. `place`: where mistakes in
+    them are told, the options themselves by default.
 
     Raises ConfigErrors with all options that are not `key=value` or that lead into a value without
     keys.
@@ -42,11 +43,12 @@ def apply_overrides(document: Document, options: Iterable[str]) -> Document:
     errors = []
     for option in options:
         try:
-            location, value = _option(option, data)
+            said = place or f"--set {option}"
+            location, value = _option(option, data, said)
             data = _replaced(data, location, value)
             for length in range(1, len(location) + 1):
                 if length == len(location) or location[:length] not in document.marks:
-                    overrides[location[:length]] = f"--set {option}"
+                    overrides[location[:length]] = said
         except KembaError as error:
             errors.append(error)
     if errors:
@@ -112,18 +114,18 @@ def is_file(path: Path) -> bool:
         return False
 
 
-def _option(option: str, data: Any) -> tuple[Location, Any]:
-    """Location and value of one `--set` option."""
+def _option(option: str, data: Any, said: str) -> tuple[Location, Any]:
+    """Location and value of one `--set` option, whose mistakes are told at what is `said`."""
     key, equals, text = option.partition("=")
     parts = key.strip().replace("[", ".").replace("]", "").split(".")
     if not equals or not all(parts):
-        raise KembaError(f"--set {option}", "is not key=value", "such as --set 'goals.apex=0.5 m'")
+        raise KembaError(said, "is not key=value", "such as --set 'goals.apex=0.5 m'")
     location: list[str | int] = []
     for part in parts:
         if isinstance(data, list):
             if not part.isdigit() or int(part) >= len(data):
                 what = f"{written(tuple(location))} has no item '{part}'"
-                raise KembaError(f"--set {option}", what, f"0 to {len(data) - 1} was expected")
+                raise KembaError(said, what, f"0 to {len(data) - 1} was expected")
             location.append(int(part))
             data = data[int(part)]
         elif isinstance(data, dict) or data is None:
@@ -131,8 +133,8 @@ def _option(option: str, data: Any) -> tuple[Location, Any]:
             data = (data or {}).get(part)
         else:
             what = f"{written(tuple(location))} is a plain value and has no key '{part}'"
-            raise KembaError(f"--set {option}", what)
-    return tuple(location), load_text(text, f"--set {option}").data
+            raise KembaError(said, what)
+    return tuple(location), load_text(text, said).data
 
 
 def _replaced(data: Any, location: Location, value: Any) -> Any:

@@ -118,24 +118,34 @@ def motions(task: Task, document: Document, within: Sequence[str] = ()) -> list[
     """The motions of a sequence in order, repeated ones as often as asked, with their documents.
     Raises KembaError, at the line of the sequence, for a file that is missing or names itself."""
     found: list[Motion] = []
-    within = within or (document.source,)
-    folder = Path(document.source).parent if document.source else Path()
-    for i, part in enumerate(task.sequence):
-        place = ("sequence", i)
+    errors: list[KembaError] = []
+    for i in range(len(task.sequence)):
         try:
-            file = str(find_config(beside(part.motion, folder), "tasks"))
+            found += _repeated(task, i, document, within or (document.source,))
         except KembaError as error:
-            raise document.error(place, f"sequence: {error.what}", hint=error.hint) from None
-        if file in within or len(within) > DEEPEST:
-            raise document.error(place, f"sequence: {part.motion} leads back to itself")
-        settings = [f"{key}={value}" for key, value in part.set.items()]
-        own = apply_overrides(load_yaml(file), settings)
-        read = read_task(own)
-        given = {key: getattr(task, key) for key in GIVEN if key in task.model_fields_set}
-        read = read.model_copy(update=given)
-        inner = motions(read, own, (*within, file)) if read.sequence else [(read, own)]
-        found += inner * part.repeat
+            errors += listed_errors(error)
+    if errors:
+        raise ConfigErrors(errors)
     return found
+
+
+def _repeated(task: Task, i: int, document: Document, within: Sequence[str]) -> list[Motion]:
+    """The motion `i` of a sequence, or those of a sequence there, as often as it is repeated."""
+    part, place = task.sequence[i], ("sequence", i)
+    folder = Path(document.source).parent if document.source else Path()
+    try:
+        file = str(find_config(beside(part.motion, folder), "tasks"))
+    except KembaError as error:
+        raise document.error(place, f"sequence: {error.what}", hint=error.hint) from None
+    if file in within or len(within) > DEEPEST:
+        raise document.error(place, f"sequence: {part.motion} leads back to itself")
+    settings = [f"{key}={value}" for key, value in part.set.items()]
+    own = apply_overrides(load_yaml(file), settings, document.place((*place, "set")))
+    read = read_task(own)
+    given = {key: getattr(task, key) for key in GIVEN if key in task.model_fields_set}
+    read = read.model_copy(update=given)
+    inner = motions(read, own, (*within, file)) if read.sequence else [(read, own)]
+    return inner * part.repeat
 
 
 def as_one(

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kemba.errors import KembaError
+from kemba.errors import ConfigErrors, KembaError
 from kemba.ocp import load_task
 from kemba.ocp.certificate.status import Status
 from kemba.ocp.planning import check_feasible, plan
@@ -62,6 +62,18 @@ def test_a_sequence_that_cannot_be_is_told(tmp_path: Path, text: str, said: str)
         task, document = load_task(tmp_path / "own.yaml")
         check_feasible(task, document)
     assert said in str(caught.value)
+
+
+def test_mistakes_of_all_motions_are_told_at_their_lines(tmp_path: Path) -> None:
+    tmp_path.joinpath("own.yaml").write_text(
+        "sequence:\n- {motion: jump_forward.yaml, set: {height: 0.45 kg}}\n"
+        "- {motion: houp.yaml}\n- {motion: hop.yaml, set: {hight: 0.4 m}}\n"
+    )
+    with pytest.raises(ConfigErrors) as caught:
+        check_feasible(*load_task(tmp_path / "own.yaml"))
+    said = str(caught.value)
+    assert "own.yaml:2: height: '0.45 kg' is a mass" in said and "--set" not in said
+    assert "own.yaml:3:3: sequence: " in said and "own.yaml:4: hight: unknown key" in said
 
 
 def test_what_a_motion_asks_is_asked_in_its_own_share_of_the_sequence(tmp_path: Path) -> None:
