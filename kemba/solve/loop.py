@@ -5,13 +5,13 @@ for each start:                     an earlier plan, one guess after the other
     for each repair:                nothing, more stages an element, edges on ticks
         execute and judge           kemba.solve.trial
     stop if the best trial is good
-    from the next guess and from this plan with physical chambers, if the simulated robot
-    misses, which has them
+    in turn with physical chambers, if only the simulated robot misses, which has them
 give the trial of the best score; where the plant keeps to none, the best that it keeps to with
 feedback                            kemba.solve.feedback
 """
 
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -203,29 +203,34 @@ def _candidates(
 
         origin = recalled(task, planning.planner.model, listener.tell)
     physical: Planning | None = None
-    guesses: Iterator[Plan] = iter(())
-    for found in planning.plans(origin):
-        yield planning, PlanCandidate(found)
-        leans = not planning.over and tried[-1].leans_on_air
-        if leans and physical is None and (physical := in_physical_air(planning)):
-            guesses = physical.plans()
-        if leans and physical is not None:
+    turns = deque([(planning, planning.plans(origin))])
+    while turns:
+        current, plans = turns.popleft()
+        found = next(plans, None)
+        if found is None:
+            continue
+        turns.append((current, plans))
+        yield current, PlanCandidate(found)
+        leans = physical is None and not planning.over and tried[-1].leans_on_air
+        if leans and (physical := in_physical_air(planning)):
             listener.tell("with the air of the simulated robot")
-            for other in _with_other_air(physical, guesses, found):
-                yield physical, PlanCandidate(other)
-    if physical is not None and not planning.over:
-        yield from ((physical, PlanCandidate(other)) for other in guesses)
+            enough = deadline - time.monotonic() > planning.clock.wall
+            turns.appendleft((physical, in_turn(physical, tried[-1].plan, guesses_first=enough)))
 
 
-def _with_other_air(physical: Planning, guesses: Iterator[Plan], old: Plan) -> Iterator[Plan]:
-    """The next plan from a guess, which may be much cheaper, and the one near the `old` plan, which
-    takes seconds."""
-    if found := next(guesses, None):
-        yield found
-    if old.refined and not physical.over:
-        near, _ = physical.continued(old.origin("the plan with other air", once=True))
-        if near is not None:
-            yield replace(near, continued=None, start=old.start)
+def in_turn(planning: Planning, old: Plan, guesses_first: bool) -> Iterator[Plan]:
+    """Plans from guesses, which may be much cheaper, and the one from the `old` plan of another
+    model, which is sooner found."""
+
+    def near() -> Iterator[Plan]:
+        found, _ = planning.continued(old.origin("the plan with other air"))
+        if found is not None:
+            yield replace(found, continued=None, start=old.start)
+
+    ways = [planning.plans(), near()]
+    for way in ways if guesses_first else reversed(ways):
+        if not planning.over:
+            yield from way
 
 
 WITH_AIR = "planned with `model: {}`, since the simulated robot missed the plan without its air"

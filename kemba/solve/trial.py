@@ -82,12 +82,12 @@ class Trial:
 
     @property
     def leans_on_air(self) -> bool:
-        """Whether the simulated robot does not keep to it, which has physical chambers where the
-        plan's model has first-order ones."""
-        there = self.judged.deciding.get("plant_replay") if self.judged else None
-        if there is None or there.good or with_lags(self.plan.model) is not None:
+        """Whether only the simulated robot does not keep to it, which has physical chambers where
+        the plan's model has first-order ones."""
+        done, found = self.judged, self.plan
+        if done is None or done.good or not done.replays or with_lags(found.model) is not None:
             return False
-        return load_spec(self.plan.task.plant).chambers == "orifice"
+        return load_spec(found.task.plant).chambers == "orifice"
 
     @property
     def misses(self) -> float:

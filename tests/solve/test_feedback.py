@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from kemba.files import read_json
+from kemba.policy.player import Policy
 from kemba.scenarios.feedback import words_of
 from kemba.solve import feedback
 from kemba.solve.trial import TrialOrder
@@ -34,6 +35,7 @@ def test_feedback_keeps_to_what_the_table_alone_misses(tmp_path: Path) -> None:
     errors = [abs(f["touchdown_error_s"]) for f in (found["feedback"], found["plant_replay"])]
     assert errors[0] < 4e-3 < errors[1]
     file = tmp_path / "run" / "policy.npz"
+    assert Policy(file).x.shape == (18,)
     assert words_of(file).startswith(f"feedback by {found['feedback']['by']} (of 3 executions")
 
 

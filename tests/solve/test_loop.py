@@ -1,5 +1,6 @@
 """In which order a trial is repaired, and what a plan that no scenario has seen says."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -103,38 +104,47 @@ def test_where_it_has_no_place_the_air_stays(
     assert loop.in_physical_air(planning) is None
 
 
-@pytest.mark.parametrize(
-    ("leans", "refined", "others"),
-    [(True, True, ["guess", "near"]), (True, False, ["guess"]), (False, True, [])],
-)
-def test_after_a_plan_that_leans_on_its_air_come_a_guess_and_itself_with_other_air(
-    leans: bool, refined: bool, others: list[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("leans", [True, False])
+def test_after_a_plan_that_leans_on_its_air_every_other_one_has_that_of_the_simulated_robot(
+    leans: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before its own next guess; a plan that is not refined is no start for that."""
+    tried: Any = []
+    physical: Any = SimpleNamespace()
+    again = [Found(Status.SOLVED, "again"), Found(Status.SOLVED, "and again")]
+    monkeypatch.setattr(loop, "in_turn", lambda planning, old, guesses_first: iter(again))
+    monkeypatch.setattr(loop, "in_physical_air", lambda planning: physical)
+    found = [Found(Status.SOLVED, name) for name in ("first", "second", "third", "fourth")]
+    planner = SimpleNamespace(task=SimpleNamespace(robust=0))
+    plans: Any = {"document": None, "plans": lambda origin: iter(found)}
+    planning: Any = SimpleNamespace(
+        planner=planner, clock=SimpleNamespace(wall=1.0), over=False, **plans
+    )
+    said = []
+    for _, one in loop._candidates(planning, tried, Approach(cold=True), Listener(), 0.0):
+        said.append(one.plan.sentence)
+        tried.append(SimpleNamespace(leans_on_air=leans, plan=one.plan))
+    last = ["second", "third", "fourth"]
+    assert said == ["first", *(["again", "second", "and again", *last[1:]] if leans else last)]
+
+
+@pytest.mark.parametrize("guesses_first", [True, False])
+def test_the_plan_with_other_air_is_continued_before_guesses_where_time_is_short(
+    guesses_first: bool,
+) -> None:
+    """Guesses are made when they are asked for, and the old plan is continued then, too."""
+    made: list[str] = []
+
+    def guesses() -> Iterator[Any]:
+        made.append("guess")
+        yield SimpleNamespace(sentence="guess")
+
+    def continued(origin: Origin) -> tuple[Any, str]:
+        made.append("continued")
+        return (replace(old, sentence="continued") if origin.plan is old.trajectory else None), ""
+
     nothing: Any = None
     at: Any = "where it is"
-    old = Plan(nothing, nothing, (), at, nothing, Status.SOLVED, "first", {}, 0, 0, refined=refined)
-    near = replace(old, sentence="near", continued=True, start="")
-
-    def continued(origin: Origin) -> tuple[Plan | None, str]:
-        return (near if origin.plan is old.trajectory else None), ""
-
-    guesses = [Found(Status.SOLVED, "guess"), Found(Status.SOLVED, "last guess")]
-    physical: Any = SimpleNamespace(continued=continued, plans=lambda: iter(guesses), over=False)
-    monkeypatch.setattr(loop, "in_physical_air", lambda planning: physical)
-    planner = SimpleNamespace(task=SimpleNamespace(robust=0))
-    plans: Any = {
-        "document": None,
-        "plans": lambda origin: iter([old, Found(Status.LIMIT, "second")]),
-    }
-    planning: Any = SimpleNamespace(planner=planner, over=False, **plans)
-    tried: Any = []
-    said = []
-    for current, one in loop._candidates(planning, tried, Approach(cold=True), Listener(), 0.0):
-        said.append((current is physical, one.plan.sentence))
-        first = one.plan.sentence == "first"
-        tried.append(SimpleNamespace(leans_on_air=leans and first, plan=one.plan))
-        if one.plan.sentence == "near":
-            assert one.plan.continued is None and one.plan.start == "guess"
-    last = [(True, "last guess")] if leans else []
-    assert said == [(False, "first"), *((True, w) for w in others), (False, "second"), *last]
+    old = Plan(nothing, nothing, (), at, nothing, Status.SOLVED, "old", {}, 0, 0)
+    planning: Any = SimpleNamespace(plans=guesses, continued=continued, over=False)
+    first = next(loop.in_turn(planning, old, guesses_first))
+    assert made == ["guess" if guesses_first else "continued"] == [first.sentence]

@@ -33,14 +33,14 @@ def test_of_two_trials_the_better_is_given(better: Trial, worse: Trial) -> None:
 
 
 @pytest.mark.parametrize(
-    ("lags", "learnt", "good", "said"),
-    [(True, False, False, True), (True, True, False, False), (False, False, False, False),
-     (True, False, True, False)],
+    ("lags", "replays", "good", "said"),
+    [(True, True, False, True), (True, False, False, False), (False, True, False, False),
+     (True, True, True, False)],
 )  # fmt: skip
-def test_first_order_air_is_blamed_where_the_simulated_robot_decides_and_misses(
-    lags: bool, learnt: bool, good: bool, said: bool, monkeypatch: pytest.MonkeyPatch
+def test_first_order_air_is_blamed_where_the_plan_is_right_and_falls(
+    lags: bool, replays: bool, good: bool, said: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """On a plant of physical chambers."""
+    """On a plant of physical chambers, of a plan that is true on its own model."""
     silent = {"another_robot": None, "lacking": [], "carried_over": [], "sentence_of": "done"}
     for name, value in silent.items():
         monkeypatch.setattr(modules, name, lambda *_, value=value: value)
@@ -51,9 +51,8 @@ def test_first_order_air_is_blamed_where_the_simulated_robot_decides_and_misses(
     )
     task = SimpleNamespace(model="planning", plant="full", payload=0.0)
     plan: Any = SimpleNamespace(task=task, model=None)
-    verdicts = {} if learnt else {"plant_replay": SimpleNamespace(good=good)}
     done: Any = SimpleNamespace(
-        deciding=verdicts, good=good, truth=SimpleNamespace(on="full"), band=None, feedback=None,
+        replays=replays, good=good, truth=SimpleNamespace(on="full"), band=None, feedback=None,
         remarks=[], causes=["it falls"],
     )  # fmt: skip
     one = Trial(plan, {}, Motions(), done)
