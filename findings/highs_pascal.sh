@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # HiGHS: a quadratic program in Pa is another program in bar; a chamber asked for 6 bar stays at 1.
 #
-# Guess, written before the run: HiGHS scales its programs, and "Optimal" with infeasibilities of 0
+# Guess, held before the run: HiGHS scales its programs, and "Optimal" with infeasibilities of 0
 # is the optimum, in Pa as in bar, as it is for its linear programs.
 #
 # Seen (highspy 1.16.0): it adds 1e-7 to every diagonal entry of the Hessian, whatever the units,

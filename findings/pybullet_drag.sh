@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # PyBullet: the default damping of 0.04 grows with the speed; jumps end 11 % short.
 #
-# Guess, written before the run: linearDamping and angularDamping of 0.04, which the guide names as
+# Guess, held before the run: linearDamping and angularDamping of 0.04, which the guide names as
 # defaults, take about 4 % of a speed in a second.
 #
 # Seen (pybullet 3.2.7): the forces on each link are m v (k + k |v|) and I w (k + k |w|) with

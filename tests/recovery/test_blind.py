@@ -13,13 +13,12 @@ from kemba.identify.answer import Answer
 from kemba.identify.workflow import compare_logs, discover_logs
 from kemba.model import load_spec
 
-FAST = {"seal_friction": 3, "valve_delay": 1}
+FAST = {"seal_friction": 3, "valve_delay": 1, "sensor_delay:piston/F": 4}
 SLOW = {
     "supply_droop": 2,
     "hose_lag": 1,
     "end_cushion": 2,
     "gas_spring": 3,
-    "sensor_delay:piston/F": 4,
 }
 
 

@@ -11,7 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kemba.identify.infer.linear import NULL, Hypothesis, Linear, precision_factor
+from kemba.identify.infer.linear import (
+    NULL,
+    Hypothesis,
+    Linear,
+    SpikeSlabSettings,
+    precision_factor,
+)
 from kemba.identify.infer.null_model import LinearisationPoint, effect_bounds
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.windows import START, error_ratio
@@ -23,7 +29,6 @@ TOLERATED = 3.0  # prior sigmas by which a nominal figure may be off: three sigm
 # share, in one run, of what tells two hypotheses apart, from which quarters of runs are left
 # out instead of runs
 ALONE = 0.9
-NONE = 1e-6  # width of the spike of absent effects: none, but not singular
 FREE = 1e6  # prior sigmas by which an effect may be off: no bound
 
 
@@ -134,7 +139,7 @@ def within_tolerance(search: Search, linear: Linear, hypothesis: Hypothesis) -> 
     Effects of the hypothesis stay within their bounds, as in a refit: a delay that ends at its
     bound would else be judged where no valve can be.
     """
-    ranker = search.base.ranker(linear, spike=NONE)
+    ranker = search.base.ranker(linear, spike=SpikeSlabSettings.silent)
     width = ranker.widths(hypothesis, 1.0)
     gram, slope, _ = linear.total
     shift = (linear.mean - linear.at) / width

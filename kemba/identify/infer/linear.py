@@ -220,7 +220,7 @@ class SpikeSlabSettings:
     # that intervals count it as 5 % and not as 2 % came of benchmarks/blind
     spike = 0.05
     slab = 0.7  # width of the slab: of a large effect, in sizes
-    silent = 1e-6  # width of the spike of a formula: none, but not singular
+    silent = 1e-6  # width of the spike of what is absent: none, but not singular
     # how far nominal figures are off, in prior sigmas; evidence is averaged over these: three nodes
     # around one prior sigma, which is itself uncertain
     tolerances = (0.5, 1.0, 1.5)

@@ -9,6 +9,7 @@ import numpy as np
 from kemba.identify.infer.linear import (
     NULL,
     Hypothesis,
+    SpikeSlabSettings,
     estimate,
     log_prior,
     names_of,
@@ -38,6 +39,7 @@ LARGEST = 10  # effects in one answer: more than any machine is expected to lack
 SWAPPED = 2  # rounds in which effects of an answer are taken away or swapped
 LEADERS_GROWN = 3  # effects that are refitted beside the best answer
 LEADERS_SWAPPED = 2  # effects that are refitted in place of one of the answer
+ALONE = 3  # effects that are refitted because they gain most where no other is there at all
 FAR_OFF = 0.1  # size of an effect from which its secant replaces its slope
 
 
@@ -159,10 +161,22 @@ class Search:
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
+        if given == NULL and self.best() != NULL:
+            self._alone(NULL)
         if given == NULL and self.points[NULL].fitted_error > STRUCTURAL:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
         return self.best()
+
+    def _alone(self, given: Hypothesis) -> None:
+        """Refit `given` with the effects that gain most where no other is there even a little: in
+        logs that tell more than the prior, a little of several others explains what a late force
+        sensor does, and the linear evidence gives nothing to that."""
+        linear, none = self.points[given].linear, SpikeSlabSettings.silent
+        table = self.base.ranker(linear, spike=none).table(given)
+        for hypothesis in sorted(table, key=lambda h: -table[h])[:ALONE]:
+            if not self.ended:
+                self.visit(hypothesis)
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""
@@ -184,6 +198,7 @@ class Search:
                 self.visit(rest)
                 least = self.points[best].log_evidence - FAR
                 self._round(rest, LEADERS_SWAPPED, least)
+                self._alone(rest)
             best = self.best()
             if best == before or self.ended:
                 break

@@ -275,9 +275,11 @@ class DriftNoise:
         return cls(shape, size**2)
 
     def out_of(self, rows: Array) -> Array:
-        """(I + UU')^-1/2 rows, of (n,) or (n, k): white again."""
+        """(I + UU')^-1/2 rows, of (n,) or (n, k): white again; not a number where a row has none,
+        as of a model that cannot be simulated."""
         lost = 1.0 - 1.0 / np.sqrt(1.0 + self.variance)
-        return np.asarray(rows - (self.shape * lost) @ (self.shape.T @ rows))
+        with np.errstate(invalid="ignore"):
+            return np.asarray(rows - (self.shape * lost) @ (self.shape.T @ rows))
 
     @property
     def log_density(self) -> float:

@@ -49,9 +49,9 @@ class Elements:
 class Refining:
     """How a refinement is solved."""
 
-    iterations = 800  # of all solves together
-    rough_iterations = 60  # iterations of other solves by either scheme
-    elastic_iterations = 200  # iterations of an elastic solve
+    iterations = 1200  # of all solves together
+    rough_iterations = 60  # iterations of a solve by the coarser scheme, and of one with a pulse
+    long_iterations = 200  # iterations of an elastic solve, and of one by the finer scheme
     # scaled: a plan nearer to its mirror image is solved by half; the certificate's tolerance
     mirrored = 1e-6
     # of a mode violated by its scale; at a lower price modes that can hold are violated too

@@ -226,7 +226,7 @@ class Refiner:
         program, x = self.build(phases, start, scheme, Refining.price)
         if step != BEST:
             x = program.proximal(x, Refining.near_elastic)
-        options = (warm if step == FINEST else rough)(Refining.elastic_iterations)
+        options = (warm if step == FINEST else rough)(Refining.long_iterations)
         options["mu_init"] = Refining.elastic_mu / 10**step
         return program, self._solve(program, program.loosened(x), options)
 
@@ -282,7 +282,7 @@ class Refiner:
     def _finer(self, phases: Sequence[Phase], other: PhaseProgram, start: Iterate) -> Solution:
         """The exact program of phases in the order of those of another one, solved from there."""
         program, x = self.build(phases, (other, start.Y), RADAU5)
-        return program, self._solve(program, x, warm(Refining.rough_iterations))
+        return program, self._solve(program, x, warm(Refining.long_iterations))
 
     def evened(self, program: PhaseProgram, found: Iterate) -> list[Phase]:
         """The phases of a program; where one of them lasts as long in a solution as its elements
