@@ -162,18 +162,17 @@ class Search:
                 break
             self.visit(hypothesis, number, len(order))
         if given == NULL and self.best() != NULL:
-            self._alone(NULL)
+            self._alone()
         if given == NULL and self.points[NULL].fitted_error > STRUCTURAL:
             for structure in sorted(self.problem.structures):
                 self.visit((structure,))
         return self.best()
 
-    def _alone(self, given: Hypothesis) -> None:
-        """Refit `given` with the effects that gain most where no other is there even a little: in
-        logs that tell more than the prior, a little of several others explains what a late force
-        sensor does, and the linear evidence gives nothing to that."""
-        linear, none = self.points[given].linear, SpikeSlabSettings.silent
-        table = self.base.ranker(linear, spike=none).table(given)
+    def _alone(self) -> None:
+        """Refit the effects that gain most where no other is there even a little: in logs that tell
+        more than the prior, a little of several others explains what a late force sensor does, and
+        the linear evidence gives nothing to that."""
+        table = self.base.ranker(self.base.point.linear, spike=SpikeSlabSettings.silent).table()
         for hypothesis in sorted(table, key=lambda h: -table[h])[:ALONE]:
             if not self.ended:
                 self.visit(hypothesis)
@@ -198,7 +197,6 @@ class Search:
                 self.visit(rest)
                 least = self.points[best].log_evidence - FAR
                 self._round(rest, LEADERS_SWAPPED, least)
-                self._alone(rest)
             best = self.best()
             if best == before or self.ended:
                 break

@@ -203,6 +203,9 @@ def caveats_of(
         unsure = tuple(e for e in unsure if is_fault(e))
     if unsure and not reasons:
         return Caveats((ENDED,), part=True, unsure=unsure)
+    if best and not reasons and round(after, 2) >= round(before, 2):  # as it is quoted
+        same = f"{enumerated(best)} leaves the error at {before:.2f} times the noise, as it was"
+        return Caveats((same,), part=True, unsure=best)
     return Caveats(tuple(reasons), part, unsure)
 
 

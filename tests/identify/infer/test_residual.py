@@ -63,3 +63,17 @@ def test_half_is_asked_where_much_is_left_that_repeats_itself(
     monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
     caveats = verdict.caveats_of(SimpleNamespace(), Selection(best), None)  # type: ignore[arg-type]
     assert verdict.verdict_on(best, None, caveats) == said
+
+
+@pytest.mark.parametrize(("after", "said"), [(0.996, "partly"), (0.994, "missing")])
+def test_what_leaves_the_quoted_error_as_it_was_is_not_sure(
+    after: float, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However significant: a force sensor 1.8 % off was missing, "1.00 and is 1.00"."""
+    best, errors = ("kick",), {(): 1.004, ("kick",): after}
+    monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
+    monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "")
+    monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
+    caveats = verdict.caveats_of(SimpleNamespace(late=False), Selection(best), None)  # type: ignore[arg-type]
+    assert verdict.verdict_on(best, None, caveats) == said
+    assert caveats.unsure == (best if said == "partly" else ())
