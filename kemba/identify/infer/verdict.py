@@ -191,7 +191,8 @@ def caveats_of(
     if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
         leaves = f"leaves an error of {after:.3g} times the noise"
         reasons.append(f"{enumerated(best)} fits best, but {leaves}")
-    if not best and selection.p_value <= settings.unexplained and before > settings.whole:
+    shows = selection.p_value <= settings.unexplained and before > settings.whole
+    if not best and (shows or before > settings.plain):
         leaves = f"the model as it is leaves an error of {before:.3g} times the noise"
         reasons.append(f"{leaves}, and no effect explains enough of it")
     if selection.rivals:

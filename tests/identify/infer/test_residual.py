@@ -1,6 +1,7 @@
 """A pattern in what an answer leaves is a reason to doubt it, unless it is negligible or chance."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,6 +75,21 @@ def test_what_leaves_the_quoted_error_as_it_was_is_not_sure(
     monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
     monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "")
     monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: errors[hypothesis])
-    caveats = verdict.caveats_of(SimpleNamespace(late=False), Selection(best), None)  # type: ignore[arg-type]
+    search: Any = SimpleNamespace(late=False)
+    caveats = verdict.caveats_of(search, Selection(best), None)
     assert verdict.verdict_on(best, None, caveats) == said
     assert caveats.unsure == (best if said == "partly" else ())
+
+
+@pytest.mark.parametrize(("left", "said"), [(1.7, "nothing"), (2.9, "unknown")])
+def test_an_error_far_beyond_the_noise_is_something(
+    left: float, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even if no single effect gains more than chance gives: nothing was missing, at 6.61 times the
+    noise, where a rise time was wrong beside orifices."""
+    monkeypatch.setattr(verdict, "unfinished", lambda search, best: False)
+    monkeypatch.setattr(verdict, "pattern_left", lambda search, best: "")
+    monkeypatch.setattr(verdict, "error", lambda search, hypothesis, kept: left)
+    search: Any = SimpleNamespace(late=False)
+    caveats = verdict.caveats_of(search, Selection(p_value=0.8), None)
+    assert verdict.verdict_on((), None, caveats) == said
