@@ -1,8 +1,6 @@
 """A model with first-order chambers in the place of physical ones: easier to plan with."""
 
-from kemba.effects.base import Effect
 from kemba.effects.catalogue import PHYSICAL
-from kemba.effects.mechanics.piston import PistonDamping
 from kemba.effects.pneumatics.chamber import Chamber, ModeDamping
 from kemba.effects.pneumatics.orifice import OrificeChamber
 from kemba.model.model import Model
@@ -19,8 +17,6 @@ def with_lags(model: Model) -> Model | None:
         name: tuple(area * gauge for gauge in first.gauge)
         for name, area in (("F_extend", cylinder.area_extend), ("F_retract", cylinder.area_retract))
     }
-    # what is left beside physical air is in the cylinder's damping
-    gone: tuple[type[Effect], ...] = (*PHYSICAL, PistonDamping)
-    kept = [e for e in model.effects if not isinstance(e, gone) and "gas" not in e.needs]
+    kept = [e for e in model.effects if not isinstance(e, PHYSICAL) and "gas" not in e.needs]
     new = Chamber(pressures=first.pressures, **steady), ModeDamping()
     return Model(model.mechanism, [*kept, *new], model.supply, model.name)

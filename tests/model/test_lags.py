@@ -28,12 +28,6 @@ def test_what_hangs_on_physical_chambers_goes_with_them() -> None:
     assert not kinds & {"orifice_chamber", "supply_line", "gas_temperature", "wall_heat"}
 
 
-def test_a_piston_is_damped_once() -> None:
-    """By the cylinder's damping, which holds what physical chambers leave to the piston."""
-    assert "piston_damping" in {e.kind for e in load_model("orifice").effects}
-    assert "piston_damping" not in {e.kind for e in lagged("orifice").effects}
-
-
 @pytest.mark.parametrize("supply", [0.6e6, 0.73e6])
 def test_at_rest_the_air_pushes_as_hard(supply: float) -> None:
     """To what a leak and a hose take."""
