@@ -27,6 +27,7 @@ from kemba.identify.infer.selection import (
     predictive,
     quoted,
     selected,
+    that_show,
 )
 from kemba.identify.infer.significance import (
     Identifiability,
@@ -168,11 +169,12 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
     whole = predictive(search, selection.best, likeliest) if selection.best else NULL
     whole = without_figure_aliases(search.problem, whole, search.points[whole].fit.theta)
     selection, whole = quoted(search, selection, whole, kept)
-    joint = None
-    if whole:
+    joint, fitted = None, NULL
+    while whole != fitted:
         search.say("fitting all that was found together")
         joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
         selection = certain(selection, joint, search.problem)
+        fitted, whole = whole, that_show(search, selection.best, whole)
     best, p_value, ended = selection.best, selection.p_value, ended or search.late
     for hypothesis in filter(None, (best, whole)):
         search.visit(hypothesis)

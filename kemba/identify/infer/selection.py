@@ -26,6 +26,7 @@ from kemba.identify.infer.cross_validation import (
     HeldOut,
     gain_over_nothing,
     left_out,
+    left_out_error,
     window_gain,
     window_powers,
 )
@@ -310,6 +311,19 @@ def certain(selection: Selection, joint: JointFit, problem: Problem) -> Selectio
     candidates = (problem.candidates[e] for e in selection.best)
     best = tuple(c.effect for c in candidates if not joint.holds_absence(c))
     return replace(selection, best=best) if best else selection
+
+
+def that_show(search: Search, best: Hypothesis, whole: Hypothesis) -> Hypothesis:
+    """The written effects without those beside the selected ones that leave the error on left-out
+    data as it is, to the two decimals that are quoted."""
+    for effect in (e for e in reversed(whole) if e not in best):
+        part = tuple(e for e in whole if e != effect)
+        if not part or search.late:
+            break
+        search.visit(part)
+        if round(left_out_error(search, part), 2) <= round(left_out_error(search, whole), 2):
+            whole = part
+    return whole
 
 
 def _joint(search: Search, hypothesis: Hypothesis) -> dict[str, float]:

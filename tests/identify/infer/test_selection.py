@@ -18,6 +18,7 @@ from kemba.identify.infer.selection import (
     overclaimed,
     selected,
     simplest,
+    that_show,
 )
 from kemba.identify.infer.verdict import caveats_of, equivalents, verdict_on
 
@@ -171,6 +172,15 @@ def test_an_effect_whose_interval_holds_its_absence_is_not_sure(
     assert certain(Selection(("hum", "kick"), 0.01), joint, problem).best == named
     alone = Selection(("hum",), 0.01)
     assert certain(alone, joint, problem) == alone, "whether there is anything is asked elsewhere"
+
+
+@pytest.mark.parametrize(("size", "written"), [(0.5, ("hum", "kick")), (0.01, ("kick",))])
+def test_what_leaves_the_quoted_error_as_it_is_is_not_written(
+    size: float, written: Hypothesis
+) -> None:
+    search = searched(Toy({"kick.a": 9.0, "hum.a": size}), "kick", "hum")
+    assert that_show(search, ("kick",), ("hum", "kick")) == written
+    assert that_show(search, ("hum", "kick"), ("hum", "kick")) == ("hum", "kick"), "selected"
 
 
 def test_an_effect_that_may_as_well_be_absent_is_not_material() -> None:
