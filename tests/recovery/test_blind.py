@@ -10,9 +10,13 @@ from twin.cases import bench_case
 
 from kemba.identify.adopt import adopted
 from kemba.identify.answer import Answer
+from kemba.identify.bench.problem import bench_problem
+from kemba.identify.discover import discover
+from kemba.identify.logs.reading import read_logs
 from kemba.identify.workflow import compare_logs, discover_logs
-from kemba.model import load_spec
+from kemba.model import load_model, load_spec
 
+ORIFICES = Path(__file__).parents[2] / "benchmarks" / "blind" / "orifice_rig.yaml"
 FAST = {"seal_friction": 3, "valve_delay": 1, "sensor_delay:piston/F": 4}
 SLOW = {
     "supply_droop": 2,
@@ -40,6 +44,16 @@ def check(found: Answer, truth: dict) -> None:
 @pytest.mark.parametrize("effect", FAST)
 def test_the_hidden_effect_is_named(effect: str, tmp_path: Path) -> None:
     check(*answer(tmp_path, effect, FAST[effect]))
+
+
+def test_figures_that_nobody_would_believe_do_not_hide_an_effect(tmp_path: Path) -> None:
+    """Areas of orifices far off imitate a rise time that is off, and a fit of nothing ends there:
+    slopes about it say that nothing is missing."""
+    short = {"runs": 3, "duration": 1.5, "chambers": "orifice"}
+    paths, truth = bench_case(tmp_path, "rise_time_scale", seed=1, **short)
+    found = discover(bench_problem(read_logs(paths), load_model(ORIFICES, rig=True)))
+    assert found.search.is_strained
+    check(found.answer, truth)
 
 
 @pytest.mark.slow

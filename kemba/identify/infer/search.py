@@ -16,8 +16,10 @@ from kemba.identify.infer.linear import (
     probabilities,
 )
 from kemba.identify.infer.null_model import Baseline, LinearisationPoint, with_learnt_colour
-from kemba.identify.infer.refit import Fit, Frozen, refit
+from kemba.identify.infer.refit import Fit, Frozen, RefitSettings, refit
+from kemba.identify.infer.windows import START
 from kemba.identify.problem.problem import Problem, Theta
+from kemba.identify.problem.sensor_faults import is_fault
 from kemba.stopwatch import Stage, Tell, silent
 
 # Which hypotheses are refitted.
@@ -40,6 +42,7 @@ SWAPPED = 2  # rounds in which effects of an answer are taken away or swapped
 LEADERS_GROWN = 3  # effects that are refitted beside the best answer
 LEADERS_SWAPPED = 2  # effects that are refitted in place of one of the answer
 ALONE = 3  # effects that are refitted because they gain most where no other is there at all
+AT_BOUND = 0.01  # widths from its bound within which a figure is at it: rounding of a fit
 FAR_OFF = 0.1  # size of an effect from which its secant replaces its slope
 
 
@@ -161,6 +164,8 @@ class Search:
             if self.ended and (given or number > 1):
                 break
             self.visit(hypothesis, number, len(order))
+        if given == NULL and self.is_strained and self._gain() < FAR:
+            self._afresh()
         if given == NULL and self.best() != NULL:
             self._alone()
         if given == NULL and self.points[NULL].fitted_error > STRUCTURAL:
@@ -176,6 +181,36 @@ class Search:
         for hypothesis in sorted(table, key=lambda h: -table[h])[:ALONE]:
             if not self.ended:
                 self.visit(hypothesis)
+
+    @property
+    def is_strained(self) -> bool:
+        """Whether the fit of nothing ends at figures of the machine that nobody would believe: at
+        the bound of one. Slopes there say little of what is missing."""
+        if self.problem.moves:
+            return False
+        theta, far = self.points[NULL].fit.theta, RefitSettings.bound - AT_BOUND
+        figures = (n for n in self.problem.nuisance if not (n.startswith(START) or is_fault(n)))
+        priors = ((n, *self.problem.nuisance[n]) for n in figures if n in theta)
+        return any(abs(theta[name] - mean) > far * width for name, mean, width in priors)
+
+    def _gain(self) -> float:
+        """Evidence [nats] of the best hypothesis over nothing."""
+        return self.points[self.best()].log_evidence - self.points[NULL].log_evidence
+
+    def _afresh(self) -> None:
+        """Refit every single effect from its usual size, and the machine from what its file says:
+        from little of the effect, figures stay where they are not believed."""
+        for number, (effect, candidate) in enumerate(sorted(self.problem.candidates.items())):
+            if self.ended:
+                break
+            self.say(Stage(f"refitting {effect}", number + 1, len(self.problem.candidates)))
+            lead, points = candidate.lead, self.points
+            for size in (lead.size, -lead.size) if lead.signed else (lead.size,):
+                start = {candidate.key: lead.off + size}
+                fit = refit(self.problem, (effect,), start, self.base.frozen)
+                if (effect,) not in points or fit.cost < points[effect,].fit.cost:
+                    points[effect,] = self._point((effect,), fit)
+                    self._thetas[effect,] = fit.theta
 
     def _grow(self, best: Hypothesis) -> Hypothesis:
         """Add effects, one by one, while the evidence grows."""

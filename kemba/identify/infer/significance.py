@@ -175,9 +175,10 @@ def best_gain(search: Search) -> float:
 
     Where the motion depends on the model, slopes there tell too little: of the refitted single
     effects; of the smallest sets that were refitted, where no single effect was. A larger set is
-    one of many more than the simulated logs are searched for, and would look rarer than it is.
+    one of many more than the simulated logs are searched for, and would look rarer than it is. So
+    too where the fit of nothing ends at figures that nobody would believe.
     """
-    if not search.problem.moves:
+    if not (search.problem.moves or search.is_strained):
         return search.base.best_gain()
     sizes = [len(h) for h in search.points if h]
     null = search.points[NULL].log_evidence
