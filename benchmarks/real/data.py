@@ -37,7 +37,11 @@ def registry() -> dict[str, Item]:
     """Every file by its path within the data folder."""
     data = yaml.safe_load(REGISTRY.read_text(encoding="utf-8"))
     return {
-        name: Item(name, sha, (source.get("url") or "").format(name=Path(name).name))
+        name: Item(
+            name,
+            sha,
+            (source.get("url") or "").format(name=Path(name).name, path=name.partition("/")[2]),
+        )  # fmt: skip
         for source in data["sources"]
         for name, sha in source["files"].items()
     }
