@@ -41,7 +41,7 @@ def registry() -> dict[str, Item]:
             name,
             sha,
             (source.get("url") or "").format(name=Path(name).name, path=name.partition("/")[2]),
-        )  # fmt: skip
+        )
         for source in data["sources"]
         for name, sha in source["files"].items()
     }

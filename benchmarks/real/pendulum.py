@@ -1,4 +1,4 @@
-"""A pendulum on a quasi-direct drive: three splits of its swing-ups, and one log moved by hand.
+"""A pendulum on a quasi-direct drive: three splits of its swing-ups, and runs pushed by hand.
 
 KEMBA_DATA=folder python -m benchmarks.real.pendulum
 
@@ -29,17 +29,22 @@ from kemba.trajectory import Trajectory
 
 MODEL = str(Path(__file__).with_name("pendulum.yaml"))
 G = 9.81  # m/s2
-RUNS = {
+SWINGS = {  # until they first stand upright: later some are pushed by hand
     "ddp": "control_method_ddp",
     "collocation": "control_method_direct_collocation",
     "energy": "control_method_energy_shaping",
-    "ilqr": "control_method_ilqr",
     "sac": "control_method_sac",
-    "pd, 1 N.m": "control_method_pd/1nm_torque_limited_swingup_failure",
     "pd, tracking": "control_method_pd/system_identification",
 }
-HANDS = {"gravity compensation": "control_method_gravity_compensation"}
-KEPT = (("energy", "pd, tracking"), ("sac", "collocation"), ("ddp", "ilqr", "pd, 1 N.m"))
+KEPT = (("ddp",), ("collocation", "energy"), ("pd, tracking", "sac"))
+UPRIGHT = 2.9  # rad
+PUSHED = {
+    "gravity compensation": "control_method_gravity_compensation",
+    "energy, whole": "control_method_energy_shaping",
+    "sac, whole": "control_method_sac",
+    "ilqr": "control_method_ilqr",
+    "pd, 1 N.m": "control_method_pd/1nm_torque_limited_swingup_failure",
+}
 # system_identification.txt of the data: J a + m l g sin q + F_v v + F_c atan(100 v) + offset
 PUBLISHED = {"J": 0.06259, "ml": 0.1022, "F_v": 0.04707, "F_c": 0.1839, "offset": -0.07586}
 
@@ -61,17 +66,21 @@ compensation is moved by hand. Maps and model were chosen, and this was written,
   should make it worse; a travel below a step of the encoder is no physics; the log that is moved
   by hand should be `unknown`.
 """
+USUAL = ("axis_scale", "axis_friction", "axis_damping", "axis_offset")
 HEAD = (
-    "| kept | drawing | published | discover | least squares, same effects | verdict | CPU s |",
-    "|---|---|---|---|---|---|---|",
+    "| kept | drawing | published | discover | least squares, same effects | with gain, friction, "
+    "damping, offset | verdict | CPU s |",
+    "|---|---|---|---|---|---|---|---|",
 )
 
 
-def log_of(folder: str, out: Path, download: bool = False) -> Path:
-    """One run as a log. Raises Absent where its file is not there."""
+def log_of(folder: str, out: Path, download: bool, until: float = np.inf) -> Path:
+    """One run as a log, `until` it is turned so far [rad]. Raises Absent where its file is not
+    there."""
     rows = np.loadtxt(find(f"pendulum/{folder}/data_measured.csv", download), delimiter=",",
                       skiprows=1)  # fmt: skip
     rows = rows[np.append(True, np.diff(rows[:, 0]) > 0)]
+    rows = rows[: next(iter(np.flatnonzero(np.abs(rows[:, 1]) > until)), len(rows))]
     columns = {"axis/q [rad]": rows[:, 1], "axis/tau [N.m]": rows[:, 3]}
     Trajectory(rows[:, 0], columns, {"kind": "drive"}).write(out)
     return out
@@ -103,8 +112,10 @@ def least_squares(learnt: Sequence[Path], kept: Sequence[Path], effects: Sequenc
 
     def columns(logs: Sequence[Path]) -> tuple[np.ndarray, np.ndarray]:
         at = sure_rows(logs)
+        sign = np.tanh(at["v"] / 1e-2)
         laws = {
-            "axis_friction": np.tanh(at["v"] / 1e-2),
+            "axis_friction": sign,
+            "presliding": sign,
             "axis_damping": at["v"],
             "axis_offset": np.ones_like(at["v"]),
             "extra_inertia": at["a"],
@@ -123,7 +134,11 @@ def least_squares(learnt: Sequence[Path], kept: Sequence[Path], effects: Sequenc
 
 def split(names: Sequence[str], scratch: Path, download: bool) -> tuple[str, Answer]:
     """One line of the table, and the answer, with these runs kept."""
-    logs = {run: log_of(RUNS[run], scratch / f"{i}.csv", download) for i, run in enumerate(RUNS)}
+    scratch.mkdir()
+    logs = {
+        run: log_of(folder, scratch / f"{run.replace(', ', '_')}.csv", download, UPRIGHT)
+        for run, folder in SWINGS.items()
+    }
     kept = [logs[run] for run in names]
     learnt = [log for run, log in logs.items() if run not in names]
     started = time.process_time()
@@ -134,6 +149,7 @@ def split(names: Sequence[str], scratch: Path, download: bool) -> tuple[str, Ans
         published(kept),
         predicted(kept, answer.model or MODEL),
         least_squares(learnt, kept, answer.added),
+        least_squares(learnt, kept, USUAL),
     )
     told = [", ".join(names), *(f"{e:.3f}" for e in errors), f"`{answer.verdict}`"]
     return f"| {' | '.join([*told, f'{seconds:.0f}'])} |", answer
@@ -148,20 +164,36 @@ def section(scratch: Path, download: bool) -> list[str]:
     """Lines of the page about the pendulum."""
     rows, sentences = [], []
     for number, names in enumerate(KEPT):
-        folder = scratch / str(number)
-        folder.mkdir()
-        row, answer = split(names, folder, download)
+        row, answer = split(names, scratch / str(number), download)
         rows.append(row)
         sentences += [f"Without {', '.join(names)}:", "", said(answer), ""]
-    for number, (name, folder_of) in enumerate(HANDS.items()):
-        log = log_of(folder_of, scratch / f"hand{number}.csv", download)
+    for number, (name, folder) in enumerate(PUSHED.items()):
+        log = log_of(folder, scratch / f"pushed{number}.csv", download)
         answer, _ = discover_logs([log], (), MODEL, time_limit=900.0)
-        sentences += [f"Moved by hand ({name}):", "", said(answer), ""]
-    came = ["As it came out (RMS of held-out torque [N.m]):", ""]
-    return [EXPECTED, *came, *HEAD, *rows, "", *sentences, *listed(NOTES), ""]
+        sentences += [f"Pushed by hand ({name}), `{answer.verdict}`:", "", said(answer), ""]
+    return [EXPECTED, FIRST, *HEAD, *rows, "", *sentences, *listed(NOTES), ""]
 
 
-NOTES: tuple[str, ...] = ()
+FIRST = """As it came out at first, with all seven runs that were meant for the splits: in two splits the run
+of 1 N.m was refused (`axis/tau` \"about 1900 times too small\"), the third was `unknown`, and the
+log that is moved by hand lacked an inertia, all of it and more, at 6.8 times the noise. A look
+at the runs then showed that someone pushes four of them (energy and sac once they stand upright,
+ilqr from 2.5 s on, 1 N.m from 10 to 12 s). So splits are of swing-ups until they first stand
+upright, and the whole runs are among those that are pushed. Five rules were changed: a unit is
+called wrong only where the motion then tells the force much better than friction and a zero alone;
+an inertia that leaves the axis none is no answer; the quoted error may take back a verdict; a
+travel until contacts slide is at least a step of the encoder; what hardly is there in the joint
+fit is not written.
+
+As it comes out since (RMS of held-out torque [N.m]):
+"""
+NOTES = (
+    "Coulomb friction of all three splits agrees: 0.18 to 0.21 N.m, each inside the intervals of "
+    "the others. It is named as `presliding` twice and as `axis_friction` once; the travel is that of a "
+    "step of the encoder or two, below which the logs cannot tell these apart.",
+    "The torque that reads too high is not named but taken for an inertia of the axis that is not "
+    "known (`drive_axis.J`), as in a swing-up both grow together.",
+)
 
 
 def main() -> None:

@@ -265,3 +265,8 @@ class VerdictSettings:
     # the same where more than `whole` is left and repeats itself, or a figure drifts
     part_of_structure = 0.5
     sure = 0.95  # probability from which an effect is sure: 95 %
+
+    @classmethod
+    def is_whole(cls, before: float, after: float) -> bool:
+        """Whether an answer that leaves the error `after` of `before` [noise units] is complete."""
+        return after <= cls.whole or excess(after) <= cls.whole_share * excess(before)

@@ -174,7 +174,7 @@ def judged(search: Search, best: Hypothesis, holdout: Problem | None = None) -> 
         search.say("fitting all that was found together")
         joint = joint_fit(search.problem, whole, search.points[whole].fit.theta)
         selection = certain(selection, joint, search.problem)
-        fitted, whole = whole, that_show(search, selection.best, whole)
+        fitted, whole = whole, that_show(search, selection.best, whole, joint)
     best, p_value, ended = selection.best, selection.p_value, ended or search.late
     for hypothesis in filter(None, (best, whole)):
         search.visit(hypothesis)

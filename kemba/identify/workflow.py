@@ -12,10 +12,11 @@ import numpy as np
 from kemba.errors import KembaError, enumerated
 from kemba.files import sha256, write_json
 from kemba.identify.adopt import COVARIANCE, reference, write_model
-from kemba.identify.answer import Answer
+from kemba.identify.answer import Answer, VerdictSettings, phrase
 from kemba.identify.compare.compare import Comparison, compare
 from kemba.identify.discover import Discovery, discover
 from kemba.identify.infer.null_model import with_learnt_colour
+from kemba.identify.infer.verdict import rest_of
 from kemba.identify.infer.windows import error_ratio, free_starts
 from kemba.identify.logs.gate import BadData, check_logs, limits_of, sentence
 from kemba.identify.logs.reading import excerpts, read_logs, taken_on
@@ -125,6 +126,7 @@ def discover_logs(
         answer = found.answer
         say("comparing what is written with the quoted logs")
         quoted = _quote(answer, judge or problem, kept or fitted, model)
+        _hold_against(found)
         answer.remarks = [*answer.remarks, *remarks]
         answer.evidence = _evidence(answer, quoted, fitted, kept, model)
     except BadData as error:
@@ -178,6 +180,21 @@ def _quote(answer: Answer, judge: Problem, logs: Sequence[Trajectory], model: st
             judge = written
     answer.rescaled_from(before)
     return judge
+
+
+def _hold_against(found: Discovery) -> None:
+    """Take back a verdict that the quoted error contradicts: the noise that the search has learnt
+    may forget what changes slowly."""
+    answer, settings = found.answer, VerdictSettings
+    before, after = answer.error_before, answer.error_after
+    leaves = f"leaves an error of {after:.3g} times the noise"
+    if answer.verdict == "missing" and not settings.is_whole(before, after):
+        answer.verdict, answer.remarks = "partly", [f"the answer {leaves}", *answer.remarks]
+        answer.rest, answer.next = rest_of(found.search, found.best, ())
+    elif answer.verdict == "nothing" and after > settings.plain:
+        reason = f"the model as it is {leaves}, and no effect explains enough of it"
+        answer.verdict, answer.remarks = "unknown", [reason, *answer.remarks]
+    answer.sentence = phrase(answer)
 
 
 def _evidence(

@@ -142,6 +142,13 @@ class JointFit:
         i = self.names.index(key)
         return bool(self.low[i] <= off <= self.high[i])
 
+    def share(self, candidate: Candidate) -> float:
+        """How far one effect's leading parameter is from absent, in its sizes."""
+        lead, key = candidate.lead, candidate.key
+        if key not in self.names or not np.isfinite(lead.off):
+            return np.inf
+        return float(abs(self.value[self.names.index(key)] - lead.off) / lead.size)
+
     def values(self, candidate: Candidate) -> dict[str, Value]:
         """The parameters of one effect, as the catalogue has them."""
         found = {}

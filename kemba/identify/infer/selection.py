@@ -313,16 +313,18 @@ def certain(selection: Selection, joint: JointFit, problem: Problem) -> Selectio
     return replace(selection, best=best) if best else selection
 
 
-def that_show(search: Search, best: Hypothesis, whole: Hypothesis) -> Hypothesis:
-    """The written effects without those beside the selected ones that leave the error on left-out
-    data as it is, to the two decimals that are quoted."""
+def that_show(search: Search, best: Hypothesis, whole: Hypothesis, joint: JointFit) -> Hypothesis:
+    """The written effects without those beside the selected ones that are too small to matter in
+    their joint fit, or leave the error on left-out data as it is, to the two decimals that are
+    quoted."""
     for effect in (e for e in reversed(whole) if e not in best):
         part = tuple(e for e in whole if e != effect)
         if not part or search.late:
             break
         search.visit(part)
-        if round(left_out_error(search, part), 2) <= round(left_out_error(search, whole), 2):
-            whole = part
+        before, after = (round(left_out_error(search, h), 2) for h in (part, whole))
+        small = joint.share(search.problem.candidates[effect]) < DiscoverSettings.matters
+        whole = part if small or before <= after else whole
     return whole
 
 

@@ -148,6 +148,9 @@ def fitted_errors(search: Search, best: Hypothesis) -> tuple[float, ...]:
 SENSOR, MOTOR = (-0.2, 0.2), (0.5, 2.0)
 DRIVEN = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}
 PLATE = 3.0  # factor by which no figure of a rig is off: feet for metres are 3.28
+NO_INERTIA = (
+    "{} would leave the axis no inertia: something else moves it, or the rig's figures are wrong"
+)
 HEAVY = 10.0  # inertia that was forgotten, over the one that is known: gears and rotors have less
 OF_RIG = (
     "{} would be {:.3g} times what the rig is said to have; the unit of a channel is wrong "
@@ -188,7 +191,7 @@ def caveats_of(
     if ended and after > settings.whole:
         reasons.append(ENDED)
         least = 0.0  # however little it explains, nothing else could be asked
-    if best and after > settings.whole and excess(after) > settings.whole_share * excess(before):
+    if best and not settings.is_whole(before, after):
         leaves = f"leaves an error of {after:.3g} times the noise"
         reasons.append(f"{enumerated(best)} fits best, but {leaves}")
     shows = selection.p_value <= settings.unexplained and before > settings.whole
@@ -230,8 +233,9 @@ def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tu
         if kind == "extra_inertia":
             axis = model.effect("drive_axis")
             assert isinstance(axis, DriveAxis)
-            times = abs(told["J"].value) / axis.inertia
+            times = told["J"].value / axis.inertia
             said += [OF_RIG.format(kind, times)] if times >= HEAVY else []
+            said += [NO_INERTIA.format(kind)] if times <= -1.0 else []
         if model.mechanism.rig == "cylinder" and any("m" in v.unit for v in told.values()):
             at = problem.operating_point()
             if doubted := unit_in_doubt(at.x, at.stroke):

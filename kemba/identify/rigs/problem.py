@@ -95,7 +95,9 @@ def sized(
     for name, candidate in candidates.items():
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
-        trial = candidate if candidate.sensor else _shaped(candidate, typical, predictor)
+        trial = (
+            candidate if candidate.sensor else _shaped(candidate, typical, predictor, _step(logs))
+        )
         theta = trial.typical()
         change = np.concatenate([predictor.gap(log, theta) for log in logs]) - base
         reach = float(np.percentile(np.abs(change), LARGE))
@@ -119,9 +121,12 @@ def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate
     return fast * candidate.lead.size < stretch[1]
 
 
-def _shaped(candidate: Candidate, typical: Mapping[str, float], predictor: Predictor) -> Candidate:
+def _shaped(
+    candidate: Candidate, typical: Mapping[str, float], predictor: Predictor, step: float
+) -> Candidate:
     """A candidate with these typical shapes, in the units of a rotary axis where it turns."""
     reach, declared = CandidateSettings.reach, BY_KIND[candidate.effect].declared()
+    least = {"presliding.travel": step}  # a travel below a step of the encoder does not show
     turns = predictor.model.mechanism.logged.get("axis/q") == "rad"
 
     def fitting(p: Parameter) -> Parameter:
@@ -129,11 +134,19 @@ def _shaped(candidate: Candidate, typical: Mapping[str, float], predictor: Predi
         unit = (turns and param.rotary) or p.unit
         if name not in typical:
             return replace(p, unit=unit)
-        ends = max(typical[name] / reach, param.lower), min(typical[name] * reach, param.upper)
+        ends = (
+            max(typical[name] / reach, param.lower, least.get(name, 0.0)),
+            min(typical[name] * reach, param.upper),
+        )
         return replace(p, unit=unit, typical=typical[name], lower=ends[0], upper=ends[1])
 
     shapes = tuple(map(fitting, candidate.shapes))
     return replace(candidate, lead=fitting(candidate.lead), shapes=shapes)
+
+
+def _step(logs: tuple[RigLog, ...]) -> float:
+    """The largest step in which a log's position is read."""
+    return max(log.step for log in logs)
 
 
 def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]:
@@ -144,7 +157,7 @@ def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]
     found = {
         "stribeck_friction.v_b": FADING * fast,
         "axis_stribeck.v_b": FADING * fast,
-        "presliding.travel": STRETCH * travel,
+        "presliding.travel": max(STRETCH * travel, _step(logs)),
         "end_cushion.L": CUSHION * travel,
     }
     if "cogging" in predictor.candidates:

@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.missing_force import dahl
-from kemba.identify.problem.noise import difference_sigma
+from kemba.identify.problem.noise import difference_sigma, step_of
 from kemba.identify.problem.problem import Array
 from kemba.model.model import Model
 from kemba.trajectory import Trajectory
@@ -173,10 +173,12 @@ BLURRED = 3.0
 @dataclass(frozen=True, eq=False)
 class RigLog(Filtered):
     """The filtered channels of one log; `doubt` (k,): share of a friction's size by which it is
-    uncertain at each judged row, because the sign of the rate is."""
+    uncertain at each judged row, because the sign of the rate is; `step`: in which its position is
+    read, 0 where in none."""
 
     name: str
     doubt: Array
+    step: float
 
     @property
     def time(self) -> Array:
@@ -220,4 +222,4 @@ def prepare(log: Trajectory, model: Model) -> RigLog:
         held = 1.0 - np.abs(np.concatenate([dahl(q, DOUBTED * travel) for q in parts]))
         reach = 2 * int(np.ceil(BLURRED * found.width / step)) + 1
         doubt = np.maximum(doubt, maximum_filter1d(held, reach)[found.rows])
-    return RigLog(**vars(found), name=name, doubt=doubt)
+    return RigLog(**vars(found), name=name, doubt=doubt, step=step_of(log[place]))

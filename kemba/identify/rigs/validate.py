@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar, nnls
 
 from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.errors import KembaError
-from kemba.identify.bench.validate import ALIKE, END, REVERSED, SMALL, Texts, simplest
+from kemba.identify.bench.validate import ALIKE, BETTER, END, REVERSED, SMALL, Texts, simplest
 from kemba.identify.problem.problem import Array
 from kemba.identify.rigs.rig_log import ANSWER, PLACE, RigLog
 from kemba.model.model import Model
@@ -46,6 +46,8 @@ def contradictions(log: RigLog, model: Model, sigma: Array, gap: Gap) -> list[Ke
         if force.left(log) < small:
             continue
         trials = {texts: force.left(trial, units) for texts, trial, units in mix_ups(log, force)}
+        most = force.unmoved(log) / BETTER  # what the motion does not tell, no column can mend
+        trials = {texts: left for texts, left in trials.items() if left < most or not texts}
         if simple := simplest(trials, small):
             said = "; or ".join(map(" and ".join, simple))
             what = "the force answers the motion so much better then"
@@ -91,11 +93,7 @@ class _Force:
 
     def _fitted(self, log: RigLog, units: Units, sign: float) -> tuple[float, tuple[float, float]]:
         """The share that is left, and the factors of rest and motion."""
-        side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
-        known = [-side * np.tanh(log.speed / (sharp * still)) for sharp in SHARP]
-        known += [-side * log.speed]
-        if self.zero:
-            known += [np.ones(len(self.sigma)), -np.ones(len(self.sigma))]
+        known = self._laws(log)
         force, rest = sign * self.read(log), self._predicted(log, TIME in units)
         moving = self._predicted(log) - rest
         free = [rest] * (self.answer in units) + [moving] * (TIME in units)
@@ -105,6 +103,18 @@ class _Force:
         first = float(factors[0]) if self.answer in units else 1.0
         both = first, float(factors[len(free) - 1]) if TIME in units else first
         return float(left) / self.size(log), both
+
+    def unmoved(self, log: RigLog) -> float:
+        """The share that is left where the model predicts no force at all."""
+        columns = np.stack(self._laws(log), axis=1) / self.sigma[:, None]
+        return float(nnls(columns, self.read(log) / self.sigma)[1]) / self.size(log)
+
+    def _laws(self, log: RigLog) -> list[Array]:
+        """Friction, damping and a zero, each (k,) of any size."""
+        side, still = 1.0 if self.model.mechanism.bore else -1.0, self.model.mechanism.sign_speed
+        found = [-side * np.tanh(log.speed / (sharp * still)) for sharp in SHARP]
+        one = np.ones(len(self.sigma))
+        return [*found, -side * log.speed, *([one, -one] if self.zero else [])]
 
     def hangs(self, log: RigLog) -> bool:
         """Whether the model at rest needs another force at another position."""

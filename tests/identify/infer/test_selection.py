@@ -178,9 +178,11 @@ def test_an_effect_whose_interval_holds_its_absence_is_not_sure(
 def test_what_leaves_the_quoted_error_as_it_is_is_not_written(
     size: float, written: Hypothesis
 ) -> None:
-    search = searched(Toy({"kick.a": 9.0, "hum.a": size}), "kick", "hum")
-    assert that_show(search, ("kick",), ("hum", "kick")) == written
-    assert that_show(search, ("hum", "kick"), ("hum", "kick")) == ("hum", "kick"), "selected"
+    search, both = searched(Toy({"kick.a": 9.0, "hum.a": size}), "kick", "hum"), ("hum", "kick")
+    large, small = (JointFit({}, ("hum.a",), *[np.array([x])] * 3, np.eye(1)) for x in (9.0, 0.0))
+    assert that_show(search, ("kick",), both, large) == written
+    assert that_show(search, ("kick",), both, small) == ("kick",)
+    assert that_show(search, both, both, small) == both, "selected"
 
 
 def test_an_effect_that_may_as_well_be_absent_is_not_material() -> None:
