@@ -174,23 +174,23 @@ def section(scratch: Path, download: bool) -> list[str]:
     return [EXPECTED, FIRST, *HEAD, *rows, "", *sentences, *listed(NOTES), ""]
 
 
-FIRST = """As it came out at first, with all seven runs that were meant for the splits: in two splits the run
-of 1 N.m was refused (`axis/tau` \"about 1900 times too small\"), the third was `unknown`, and the
-log that is moved by hand lacked an inertia, all of it and more, at 6.8 times the noise. A look
-at the runs then showed that someone pushes four of them (energy and sac once they stand upright,
-ilqr from 2.5 s on, 1 N.m from 10 to 12 s). So splits are of swing-ups until they first stand
-upright, and the whole runs are among those that are pushed. Five rules were changed: a unit is
-called wrong only where the motion then tells the force much better than friction and a zero alone;
-an inertia that leaves the axis none is no answer; the quoted error may take back a verdict; a
-travel until contacts slide is at least a step of the encoder; what hardly is there in the joint
-fit is not written.
+FIRST = """As it came out at first, with all seven runs that were meant for the splits: in two of
+them the run of 1 N.m was refused (`axis/tau` "about 1900 times too small"), the third was
+`unknown`, and the log that is moved by hand lacked an inertia, all of it and more, at 6.8 times
+the noise. A look at the runs then showed that someone pushes four of them (energy and sac once
+they stand upright, ilqr from 2.5 s on, 1 N.m from 10 to 12 s). So splits are of swing-ups until
+they first stand upright, and the whole runs are among those that are pushed. Five rules were
+changed: a unit is called wrong only where the motion then tells the force much better than
+friction and a zero alone; an inertia that leaves the axis none is no answer; the quoted error may
+take back a verdict; a travel until contacts slide is at least a step of the encoder; what hardly
+is there in the joint fit is not written.
 
 As it comes out since (RMS of held-out torque [N.m]):
 """
 NOTES = (
-    "Coulomb friction of all three splits agrees: 0.18 to 0.21 N.m, each inside the intervals of "
-    "the others. It is named as `presliding` twice and as `axis_friction` once; the travel is that of a "
-    "step of the encoder or two, below which the logs cannot tell these apart.",
+    "Coulomb friction of all three splits agrees: 0.18 to 0.21 N.m, with intervals that overlap. "
+    "It is named as `presliding` twice and as `axis_friction` once; the travel is that "
+    "of a step of the encoder or two, below which logs cannot tell these apart.",
     "The torque that reads too high is not named but taken for an inertia of the axis that is not "
     "known (`drive_axis.J`), as in a swing-up both grow together.",
 )
