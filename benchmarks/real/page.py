@@ -11,7 +11,7 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from benchmarks.real import cylinder, emps, pendulum, seals, vessel
+from benchmarks.real import cylinder, emps, pendulum, seals, shoulder, vessel
 from benchmarks.real.data import Absent
 
 PAGE = Path(__file__).parents[2] / "benchmarks" / "pages" / "real-data.md"
@@ -82,7 +82,7 @@ def main() -> None:
     parser.add_argument("--download", action="store_true", help="fetch what has an address")
     download = parser.parse_args().download
     lines = [HEAD]
-    for part in (cylinder, seals, emps, pendulum, vessel):
+    for part in (cylinder, seals, emps, pendulum, shoulder, vessel):
         with tempfile.TemporaryDirectory() as folder:
             try:
                 lines += part.section(Path(folder), download)

@@ -86,10 +86,10 @@ def log_of(folder: str, out: Path, download: bool, until: float = np.inf) -> Pat
     return out
 
 
-def sure_rows(logs: Sequence[Path]) -> dict[str, np.ndarray]:
+def sure_rows(logs: Sequence[Path], model: str = MODEL) -> dict[str, np.ndarray]:
     """Measured torque `tau`, that of the drawing `drawn`, and `q`, `v`, `a` (n,) of rows in which
     the axis turns for sure."""
-    problem, found = rig_problem(read_logs(logs), load_model(MODEL)), []
+    problem, found = rig_problem(read_logs(logs), load_model(model)), []
     for log in problem.logs:
         sure = log.doubt < SURE
         tau = log.others["axis/tau"][log.rows][sure]
@@ -107,11 +107,13 @@ def published(kept: Sequence[Path]) -> float:
     return float(np.sqrt(np.mean((at["tau"] - tau) ** 2)))
 
 
-def least_squares(learnt: Sequence[Path], kept: Sequence[Path], effects: Sequence[str]) -> float:
+def least_squares(
+    learnt: Sequence[Path], kept: Sequence[Path], effects: Sequence[str], model: str = MODEL
+) -> float:
     """RMS [N.m] of these effects of the drawing's model, as far as they are linear."""
 
     def columns(logs: Sequence[Path]) -> tuple[np.ndarray, np.ndarray]:
-        at = sure_rows(logs)
+        at = sure_rows(logs, model)
         sign = np.tanh(at["v"] / 1e-2)
         laws = {
             "axis_friction": sign,
