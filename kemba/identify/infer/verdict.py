@@ -149,7 +149,7 @@ SENSOR, MOTOR = (-0.2, 0.2), (0.5, 2.0)
 DRIVEN = {"axis_scale": "axis/tau", "torque_scale": "hip/tau"}
 PLATE = 3.0  # factor by which no figure of a rig is off: feet for metres are 3.28
 NO_INERTIA = (
-    "{} would leave the axis no inertia: something else moves it, or the rig's figures are wrong"
+    "the axis would have no inertia: something else moves it, or the rig's figures are wrong"
 )
 HEAVY = 10.0  # inertia that was forgotten, over the one that is known: gears and rotors have less
 OF_RIG = (
@@ -235,7 +235,7 @@ def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tu
             assert isinstance(axis, DriveAxis)
             times = told["J"].value / axis.inertia
             said += [OF_RIG.format(kind, times)] if times >= HEAVY else []
-            said += [NO_INERTIA.format(kind)] if times <= -1.0 else []
+            said += [NO_INERTIA] if times <= -1.0 else []
         if model.mechanism.rig == "cylinder" and any("m" in v.unit for v in told.values()):
             at = problem.operating_point()
             if doubted := unit_in_doubt(at.x, at.stroke):
@@ -245,7 +245,8 @@ def implausible(search: Search, found: Hypothesis, joint: JointFit | None) -> tu
             given = given_figure(model, *figure.rsplit(".", 1))
             i = joint.names.index(figure)
             if joint.low[i] / given >= PLATE or joint.high[i] / given <= 1.0 / PLATE:
-                said.append(OF_RIG.format(figure, value / given))
+                none = figure == "drive_axis.J" and value <= given / HEAVY
+                said.append(NO_INERTIA if none else OF_RIG.format(figure, value / given))
     return tuple(dict.fromkeys(said))
 
 

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from toy_problem import Toy
 
-from kemba.identify.answer import ENDED, HELD_OUT, Answer, Ranked, Value, phrase
-from kemba.identify.discover import discover
+from kemba.identify.answer import ENDED, HELD_OUT, Answer, Ranked, Value, Verdict, phrase
+from kemba.identify.discover import Discovery, discover
 from kemba.identify.infer.cross_validation import Gain, left_out, left_out_error
 from kemba.identify.infer.linear import NULL, SpikeSlabSettings, probabilities
 from kemba.identify.infer.search import Search
 from kemba.identify.infer.selection import Selection, material
 from kemba.identify.infer.verdict import caveats_of, values, verdict_on
+from kemba.identify.workflow import _hold_against
 from kemba.plotting.comparison import plot_ladder
 
 
@@ -304,3 +305,25 @@ def test_what_would_raise_the_quoted_error_is_not_written(before: float, verdict
     assert (found.verdict, found.writes, found.error_after) == (verdict, False, before)
     assert found.remarks[0] == f"payload would raise the quoted error from {before:.2f} to 3.00: " \
         "no model is written"  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdict", "before", "after", "told"),
+    [
+        ("missing", 11.2, 1.4, "missing"),
+        ("missing", 11.2, 6.8, "partly"),
+        ("nothing", 2.3, 2.3, "nothing"),
+        ("nothing", 4.2, 2.6, "unknown"),
+    ],
+)
+def test_a_verdict_holds_by_the_error_that_is_quoted(
+    verdict: Verdict, before: float, after: float, told: str
+) -> None:
+    """The search may have learnt a noise that forgets what changes slowly."""
+    search = Search(Toy({"kick.a": 9.0}))
+    search.run()
+    answer = Answer(verdict, error_before=before, error_after=after)
+    answer.added = ("kick",) if verdict == "missing" else ()
+    _hold_against(Discovery(answer, search, answer.added))
+    assert answer.verdict == told
+    assert any(f"leaves an error of {after:g}" in r for r in answer.remarks) == (told != verdict)

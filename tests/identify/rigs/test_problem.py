@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from kemba.config import dump_yaml
-from kemba.identify.rigs.problem import RigProblem, _strongest_period
+from kemba.identify.rigs.problem import RigProblem, _strongest_period, rig_problem
 from kemba.identify.workflow import discover_logs
+from kemba.model import load_model
 from kemba.trajectory import Trajectory
 
 
@@ -41,6 +42,19 @@ def test_the_strongest_period_has_its_phase(phase: float) -> None:
     assert period == pytest.approx(0.1, rel=0.03)
     # the period is one of a grid: over the travel from -1 to 1 its phase is off where q is not 0
     assert found == pytest.approx(phase, abs=0.2)
+
+
+@pytest.mark.parametrize("step", [1e-4, 5e-3])
+def test_a_travel_until_contacts_slide_is_no_shorter_than_a_step_of_the_encoder(
+    step: float,
+) -> None:
+    t = np.arange(0.0, 6.0, 2e-3)
+    q, noise = 0.6 * np.sin(2.0 * t), np.random.default_rng(0).standard_normal(len(t))
+    columns = {"axis/q [rad]": step * np.round(q / step), "axis/tau [N.m]": q + 0.01 * noise}
+    log = Trajectory(t, columns, {"kind": "drive", "name": "log"})
+    found = rig_problem([log], load_model("pendulum_rig")).candidates["presliding"]
+    (travel,) = (p for p in found.shapes if p.name == "travel")
+    assert travel.typical >= travel.lower >= 0.999 * step
 
 
 def test_what_is_left_is_said_of_the_answer_whose_error_is_quoted(tmp_path: Path) -> None:

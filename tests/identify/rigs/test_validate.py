@@ -329,6 +329,20 @@ def test_less_friction_than_the_model_has_hides_no_mistake(friction: float) -> N
             rig_problem([log], model).validate()
 
 
+def test_a_force_that_does_not_answer_the_motion_is_no_mistake_of_columns() -> None:
+    """A hand moves the axis while the motor holds: a unit that hides the model suits any force."""
+    log = pendulum(Q, np.full(len(TIME), 0.9))
+    assert rig_problem([log], load_model("pendulum_rig")).validate() == []
+
+
+def test_what_a_hand_moves_lacks_no_inertia(tmp_path: Path) -> None:
+    """A motor that carries the weight and nothing else: the hand does what the inertia needs."""
+    pendulum(Q, 1.5 * 0.25 * 9.81 * np.sin(Q)).write(tmp_path / "log.csv")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), "pendulum_rig")
+    assert answer.verdict == "unknown" and not answer.writes
+    assert "the axis would have no inertia: something else moves it" in answer.sentence
+
+
 def test_friction_and_small_zeros_are_no_mistakes() -> None:
     """These are for `discover` to find."""
     log = pendulum(Q + 0.1, FORCE + 1.5 * np.tanh(V / 0.01))
