@@ -40,7 +40,7 @@ from kemba.identify.problem.problem import Theta
 
 STUDIES = (
     *("bench", "robot", "second"),
-    *("bench_16000", "bench_26000", "robot_19000", "robot_24000", "second_21000"),
+    *("bench_16000", "bench_26000", "bench_31000", "robot_19000", "robot_24000", "second_21000"),
 )
 FALSE = 0.03  # share of machines without any effect that may be blamed
 
