@@ -146,6 +146,7 @@ class Effect(BaseModel):
     own_rigs: ClassVar[bool] = False  # True: looked for as missing on rigs of the user's own only
     needs: ClassVar[tuple[str, ...]] = ()  # published values without which it cannot be missing
     replaces: ClassVar[tuple[str, ...]] = ()  # kinds that this one replaces in a model
+    law_of: ClassVar[str] = ""  # of laws of one thing, an answer names one
     mirror: ClassVar[Mapping[str, str]] = {}  # symbols that change sign or name in the mirror
     dissipative: ClassVar[bool] = False
     moves: ClassVar[bool] = True  # False: in what is measured only; plans and simulations ignore it

@@ -20,6 +20,7 @@ class AxisFriction(AxisEffect):
     equation = "-F_c tanh(v/(w sign_speed))"
     source = SURVEY
     dissipative = True
+    law_of = "sliding of the axis"
 
     def evaluate(self, at: At) -> Contribution:
         return Contribution(effort={"axis": coulomb(self.F_c, at.axis.v, self.w * at.sign_speed)})
@@ -114,6 +115,7 @@ class Presliding(AxisEffect):
     ] = 2e-4
 
     equation = "-F_p z, travel dz/dt = v - abs(v) z"
+    law_of = AxisFriction.law_of
     source = "P. R. Dahl, A solid friction model, Aerospace Corporation, 1968"
     mirror: ClassVar[dict[str, str]] = {"z": "-z"}
 

@@ -314,8 +314,10 @@ class Ranker:
         return total
 
     def table(self, given: Hypothesis = ()) -> dict[Hypothesis, float]:
-        """Log evidence of `given` with each further effect."""
-        others = [name for name in sorted(self.candidates) if name not in given]
+        """Log evidence of `given` with each further effect; of laws of one thing, with one."""
+        taken = {self.candidates[name].law_of for name in given} - {""}
+        others = [name for name, c in sorted(self.candidates.items())
+                  if name not in given and c.law_of not in taken]  # fmt: skip
         _, *evidence = self.beside(given, others, self._slope[:, None])[:, 0].tolist()
         return dict(zip((tuple(sorted((*given, e))) for e in others), evidence, strict=True))
 

@@ -402,7 +402,7 @@ def _candidate(
         p, typical = declared[other], float(effect.model_fields[other].default)
         bounds = (max(p.lower, typical / settings.reach), min(p.upper, typical * settings.reach))
         shapes.append(Parameter(other, p.unit, typical, settings.shape, *bounds, typical))
-    return Candidate(name, switch, tuple(shapes), sensor)
+    return Candidate(name, switch, tuple(shapes), sensor, effect.law_of)
 
 
 def _fits(model: Model, effect: type[Effect]) -> bool:

@@ -64,6 +64,7 @@ class Candidate:
     lead: Parameter
     shapes: tuple[Parameter, ...] = ()
     sensor: bool = False
+    law_of: str = ""  # of laws of one thing, an answer names one
     # searched as 1/value, reported as the catalogue has it: {"softness": ("k", "N.m-1")}
     reciprocal: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 

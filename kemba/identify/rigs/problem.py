@@ -12,6 +12,7 @@ import numpy as np
 from typing_extensions import Self
 
 from kemba.effects import BY_KIND
+from kemba.effects.rigs.axis import DriveAxis
 from kemba.errors import KembaError
 from kemba.identify.logs.gate import BadData
 from kemba.identify.problem.candidates import (
@@ -90,14 +91,13 @@ def sized(
     """The candidates with sizes and shapes that suit the rig; those that cannot show in these logs
     are left out."""
     usual, found = usual_force(predictor, logs), {}
-    typical = _typical(predictor, logs)
+    limits = _limits(predictor, logs)
+    typical = _typical(predictor, logs, limits)
     base = np.concatenate([predictor.gap(log, {}) for log in logs])
     for name, candidate in candidates.items():
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
-        trial = (
-            candidate if candidate.sensor else _shaped(candidate, typical, predictor, _step(logs))
-        )
+        trial = candidate if candidate.sensor else _shaped(candidate, typical, predictor, limits)
         theta = trial.typical()
         change = np.concatenate([predictor.gap(log, theta) for log in logs]) - base
         reach = float(np.percentile(np.abs(change), LARGE))
@@ -122,11 +122,14 @@ def _hidden(predictor: Predictor, logs: tuple[RigLog, ...], candidate: Candidate
 
 
 def _shaped(
-    candidate: Candidate, typical: Mapping[str, float], predictor: Predictor, step: float
+    candidate: Candidate,
+    typical: Mapping[str, float],
+    predictor: Predictor,
+    limits: Mapping[str, tuple[float, float]],
 ) -> Candidate:
-    """A candidate with these typical shapes, in the units of a rotary axis where it turns."""
+    """A candidate with these typical shapes within `limits`, in the units of a rotary axis where it
+    turns."""
     reach, declared = CandidateSettings.reach, BY_KIND[candidate.effect].declared()
-    least = {"presliding.travel": step}  # a travel below a step of the encoder does not show
     turns = predictor.model.mechanism.logged.get("axis/q") == "rad"
 
     def fitting(p: Parameter) -> Parameter:
@@ -134,22 +137,29 @@ def _shaped(
         unit = (turns and param.rotary) or p.unit
         if name not in typical:
             return replace(p, unit=unit)
-        ends = (
-            max(typical[name] / reach, param.lower, least.get(name, 0.0)),
-            min(typical[name] * reach, param.upper),
-        )
-        return replace(p, unit=unit, typical=typical[name], lower=ends[0], upper=ends[1])
+        least, most = limits.get(name, (0.0, np.inf))
+        lower = max(typical[name] / reach, param.lower, least)
+        upper = min(typical[name] * reach, param.upper, most)
+        start = float(np.clip(typical[name], lower, upper))
+        return replace(p, unit=unit, typical=start, lower=lower, upper=upper)
 
     shapes = tuple(map(fitting, candidate.shapes))
     return replace(candidate, lead=fitting(candidate.lead), shapes=shapes)
 
 
-def _step(logs: tuple[RigLog, ...]) -> float:
-    """The largest step in which a log's position is read."""
-    return max(log.step for log in logs)
+def _limits(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, tuple[float, float]]:
+    """Least and largest shapes that can show: no travel below a step of the encoder, and no cogging
+    of one period a turn where a weight hangs, which needs such a force by itself."""
+    found = {"presliding.travel": (max(log.step for log in logs), np.inf)}
+    axes = (e for e in predictor.model.effects if isinstance(e, DriveAxis))
+    if any(axis.hangs and axis.m > 0.0 for axis in axes):
+        found["cogging.period"] = (0.0, np.pi)
+    return found
 
 
-def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]:
+def _typical(
+    predictor: Predictor, logs: tuple[RigLog, ...], limits: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
     """Where the search for shapes starts, by name in theta."""
     speed = np.concatenate([np.abs(log.speed) for log in logs])
     places = np.concatenate([log.q[log.rows] for log in logs])
@@ -157,17 +167,22 @@ def _typical(predictor: Predictor, logs: tuple[RigLog, ...]) -> dict[str, float]
     found = {
         "stribeck_friction.v_b": FADING * fast,
         "axis_stribeck.v_b": FADING * fast,
-        "presliding.travel": max(STRETCH * travel, _step(logs)),
+        "presliding.travel": max(STRETCH * travel, limits["presliding.travel"][0]),
         "end_cushion.L": CUSHION * travel,
     }
     if "cogging" in predictor.candidates:
-        period, phase = _strongest_period(predictor, logs)
+        period, phase = _strongest_period(
+            predictor, logs, limits.get("cogging.period", (0.0, np.inf))[1]
+        )
         found |= {"cogging.period": period, "cogging.phase": phase}
     return found
 
 
-def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[float, float]:
-    """Travel and phase of the sine that explains most beside inertia, friction, offset."""
+def _strongest_period(
+    predictor: Predictor, logs: tuple[RigLog, ...], most: float = np.inf
+) -> tuple[float, float]:
+    """Travel, up to `most`, and phase of the sine that explains most beside inertia, friction,
+    offset."""
     none: Theta = {}
     force = np.concatenate([-predictor.gap(log, none) for log in logs])
     q, v, a = (np.concatenate([getattr(log, c)[log.rows] for log in logs]) for c in "qva")
@@ -179,7 +194,8 @@ def _strongest_period(predictor: Predictor, logs: tuple[RigLog, ...]) -> tuple[f
     travel = float(np.ptp(q))
     finest = max(travel / 300.0, 4.0 * float(np.median(np.abs(np.diff(q)))) + 1e-12)
     best, answer = 0.0, (travel / 3.0, 1.0)
-    for period in np.geomspace(min(finest, travel / 3.0), travel / 1.5, PERIODS):
+    longest = min(travel / 1.5, most)
+    for period in np.geomspace(min(finest, longest / 2.0), longest, PERIODS):
         wave = np.exp(2j * np.pi * q / period)
         power = abs(complex(np.vdot(wave, left)))
         if power > best:

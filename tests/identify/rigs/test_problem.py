@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kemba.config import dump_yaml
+from kemba.identify.infer.search import Search
 from kemba.identify.rigs.problem import RigProblem, _strongest_period, rig_problem
 from kemba.identify.workflow import discover_logs
 from kemba.model import load_model
@@ -44,15 +45,44 @@ def test_the_strongest_period_has_its_phase(phase: float) -> None:
     assert found == pytest.approx(phase, abs=0.2)
 
 
+def swung(step: float = 1e-4) -> Trajectory:
+    """An axis that swings, read in steps."""
+    t = np.arange(0.0, 6.0, 2e-3)
+    q, noise = 0.6 * np.sin(2.0 * t), np.random.default_rng(0).standard_normal(len(t))
+    columns = {"axis/q [rad]": step * np.round(q / step), "axis/tau [N.m]": q + 0.01 * noise}
+    return Trajectory(t, columns, {"kind": "drive", "name": "log"})
+
+
+@pytest.mark.parametrize(("arm", "most"), [(0.25, np.pi), (None, np.inf)])
+def test_cogging_of_one_period_a_turn_is_the_weight_that_hangs(
+    arm: float | None, most: float, tmp_path: Path
+) -> None:
+    rig = {"kind": "drive", "motion": "rotary", "inertia": "0.1 kg.m2"}
+    rig |= {"load": {"mass": "1 kg", "arm": f"{arm} m"}} if arm else {}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    log = swung()
+    log.columns["axis/q [rad]"][:] *= 10.0  # several turns
+    found = rig_problem([log], load_model(tmp_path / "model.yaml")).candidates["cogging"]
+    (period,) = (p for p in found.shapes if p.name == "period")
+    assert period.typical <= period.upper and (period.upper <= np.pi) == (most == np.pi)
+
+
+def test_an_answer_names_one_law_of_one_friction(tmp_path: Path) -> None:
+    rig = {"kind": "drive", "motion": "rotary", "inertia": "0.1 kg.m2"}
+    dump_yaml({"rig": rig}, tmp_path / "model.yaml")
+    search = Search(rig_problem([swung()], load_model(tmp_path / "model.yaml")))
+    search.start()
+    ranker = search.base.ranker(search.base.point.linear)
+    assert ("axis_friction", "presliding") not in ranker.table(("presliding",))
+    assert ("axis_damping", "presliding") in ranker.table(("presliding",))
+    assert {("axis_friction",), ("presliding",)} < set(ranker.table())
+
+
 @pytest.mark.parametrize("step", [1e-4, 5e-3])
 def test_a_travel_until_contacts_slide_is_no_shorter_than_a_step_of_the_encoder(
     step: float,
 ) -> None:
-    t = np.arange(0.0, 6.0, 2e-3)
-    q, noise = 0.6 * np.sin(2.0 * t), np.random.default_rng(0).standard_normal(len(t))
-    columns = {"axis/q [rad]": step * np.round(q / step), "axis/tau [N.m]": q + 0.01 * noise}
-    log = Trajectory(t, columns, {"kind": "drive", "name": "log"})
-    found = rig_problem([log], load_model("pendulum_rig")).candidates["presliding"]
+    found = rig_problem([swung(step)], load_model("pendulum_rig")).candidates["presliding"]
     (travel,) = (p for p in found.shapes if p.name == "travel")
     assert travel.typical >= travel.lower >= 0.999 * step
 
