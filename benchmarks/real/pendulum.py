@@ -181,11 +181,12 @@ them the run of 1 N.m was refused (`axis/tau` "about 1900 times too small"), the
 `unknown`, and the log that is moved by hand lacked an inertia, all of it and more, at 6.8 times
 the noise. A look at the runs then showed that someone pushes four of them (energy and sac once
 they stand upright, ilqr from 2.5 s on, 1 N.m from 10 to 12 s). So splits are of swing-ups until
-they first stand upright, and the whole runs are among those that are pushed. Five rules were
+they first stand upright, and the whole runs are among those that are pushed. Seven rules were
 changed: a unit is called wrong only where the motion then tells the force much better than
 friction and a zero alone; an inertia that leaves the axis none is no answer; the quoted error may
 take back a verdict; a travel until contacts slide is at least a step of the encoder; what hardly
-is there in the joint fit is not written.
+is there in the joint fit is not written; of laws of one friction an answer names one; where a
+weight hangs, no cogging of one period a turn is looked for.
 
 As it comes out since (RMS of held-out torque [N.m]):
 """

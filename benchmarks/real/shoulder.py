@@ -34,12 +34,12 @@ time is kept in turn. Written before `discover` was asked:
 |---|---|---|---|---|"""
 
 NOTES = (
-    "Here the answers of the splits do not agree, and this resists. The shoulder swings by 0.3 rad "
-    "near its own frequency, where weight and inertia nearly cancel: least squares keeps 14 to "
-    "36 % of the drawing's torque, and friction, damping and a torque that reads wrong share the "
-    "rest in another way in every third. What would be needed are runs that are slower and wider "
-    "(of the ones published the elbow stays still in this one alone), and laws of one friction "
-    "that are asked for as one class.",
+    "Sliding friction and damping are named in all splits, with intervals that overlap; at first, "
+    "two laws of one friction shared it in another way in every third, and one third was `unknown`. "
+    "The friction is less than published, since a second law and a torque that reads wrong take a "
+    "part of it: the shoulder swings by 0.3 rad near its own frequency, where weight and inertia "
+    "nearly cancel, and least squares keeps 14 to 36 % of the drawing's torque. What would be needed "
+    "are runs that are slower and wider (the elbow stays still in this one alone).",
 )
 
 
