@@ -35,11 +35,11 @@ time is kept in turn. Written before `discover` was asked:
 
 NOTES = (
     "Sliding friction and damping are named in all splits, with intervals that overlap; at first, "
-    "two laws of one friction shared it in another way in every third, and one third was `unknown`. "
-    "The friction is less than published, since a second law and a torque that reads wrong take a "
-    "part of it: the shoulder swings by 0.3 rad near its own frequency, where weight and inertia "
-    "nearly cancel, and least squares keeps 14 to 36 % of the drawing's torque. What would be needed "
-    "are runs that are slower and wider (the elbow stays still in this one alone).",
+    "two laws of one friction shared it in another way in every third, and one was `unknown`. The "
+    "friction is less than published, since a second law and a torque that reads wrong take a part "
+    "of it: the shoulder swings by 0.3 rad near its own frequency, where weight and inertia nearly "
+    "cancel, and least squares keeps 14 to 36 % of the drawing's torque. What would be needed are "
+    "runs that are slower and wider (the elbow stays still in this one alone).",
 )
 
 
