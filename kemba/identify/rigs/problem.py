@@ -73,6 +73,8 @@ LARGE = 95.0  # percentile of the rows that counts as the largest [%]
 FADING = 0.2  # rate at which a Stribeck friction fades, over the largest rate
 STRETCH = 1e-3  # travel until contacts slide, over the whole travel
 CUSHION = 0.1  # length of a cushion, over the whole travel
+# usual zero of an axis that turns [rad]: set by hand, to a degree, however little its encoder errs
+ZERO = 0.02
 PERIODS = 300  # periods that are tried for a cogging force
 
 
@@ -98,6 +100,8 @@ def sized(
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
         trial = candidate if candidate.sensor else _shaped(candidate, typical, predictor, limits)
+        if name == "sensor_bias:axis/q" and trial.lead.unit == "rad":
+            trial = replace(trial, lead=replace(trial.lead, size=max(trial.lead.size, ZERO)))
         theta = trial.typical()
         change = np.concatenate([predictor.gap(log, theta) for log in logs]) - base
         reach = float(np.percentile(np.abs(change), LARGE))

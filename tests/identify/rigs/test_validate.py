@@ -343,6 +343,14 @@ def test_what_a_hand_moves_lacks_no_inertia(tmp_path: Path) -> None:
     assert "the axis would have no inertia: something else moves it" in answer.sentence
 
 
+def test_a_zero_that_is_off_by_a_few_degrees_is_named(tmp_path: Path) -> None:
+    """However little the encoder errs otherwise: a constant torque would be another effect."""
+    pendulum(Q + 0.1, FORCE).write(tmp_path / "log.csv")
+    answer, _ = discover_logs([tmp_path / "log.csv"], (), "pendulum_rig")
+    assert (answer.verdict, answer.added) == ("missing", ("sensor_bias:axis/q",)), answer.sentence
+    assert answer.ranking[0].parameters["b"].value == pytest.approx(0.1, rel=0.05)
+
+
 def test_friction_and_small_zeros_are_no_mistakes() -> None:
     """These are for `discover` to find."""
     log = pendulum(Q + 0.1, FORCE + 1.5 * np.tanh(V / 0.01))
