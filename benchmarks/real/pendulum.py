@@ -181,19 +181,22 @@ them the run of 1 N.m was refused (`axis/tau` "about 1900 times too small"), the
 `unknown`, and the log that is moved by hand lacked an inertia, all of it and more, at 6.8 times
 the noise. A look at the runs then showed that someone pushes four of them (energy and sac once
 they stand upright, ilqr from 2.5 s on, 1 N.m from 10 to 12 s). So splits are of swing-ups until
-they first stand upright, and the whole runs are among those that are pushed. Seven rules were
+they first stand upright, and the whole runs are among those that are pushed. Eight rules were
 changed: a unit is called wrong only where the motion then tells the force much better than
 friction and a zero alone; an inertia that leaves the axis none is no answer; the quoted error may
 take back a verdict; a travel until contacts slide is at least a step of the encoder; what hardly
 is there in the joint fit is not written; of laws of one friction an answer names one; where a
-weight hangs, no cogging of one period a turn is looked for.
+weight hangs, no cogging of one period a turn is looked for; the zero of an axis that turns may be
+off by degrees.
 
 As it comes out since (RMS of held-out torque [N.m]):
 """
 NOTES = (
-    "Coulomb friction of all three splits agrees: 0.18 to 0.21 N.m, with intervals that overlap. "
-    "It is named as `presliding` twice and as `axis_friction` once; the travel is that "
-    "of a step of the encoder or two, below which logs cannot tell these apart.",
+    "The three answers agree: Coulomb friction of 0.18 to 0.21 N.m, named as `presliding` twice and "
+    "as `axis_friction` once (its travel is that of a step of the encoder or two, below which logs "
+    "cannot tell these apart), and an encoder whose zero is 0.009 to 0.010 rad off, with intervals "
+    "that overlap. Before a zero could be off by degrees, whatever the encoder's noise, a cogging "
+    "of long period stood in its place.",
     "The torque that reads too high is not named but taken for an inertia of the axis that is not "
     "known (`drive_axis.J`), as in a swing-up both grow together.",
 )
