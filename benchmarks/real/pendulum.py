@@ -192,7 +192,7 @@ off by degrees.
 As it comes out since (RMS of held-out torque [N.m]):
 """
 NOTES = (
-    "The three answers agree: Coulomb friction of 0.18 to 0.21 N.m, named as `presliding` twice and "
+    "The three answers agree: Coulomb friction of 0.18 to 0.21 N.m, named `presliding` twice and "
     "as `axis_friction` once (its travel is that of a step of the encoder or two, below which logs "
     "cannot tell these apart), and an encoder whose zero is 0.009 to 0.010 rad off, with intervals "
     "that overlap. Before a zero could be off by degrees, whatever the encoder's noise, a cogging "
