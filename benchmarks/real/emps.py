@@ -26,6 +26,6 @@ def section(scratch: Path, download: bool) -> list[str]:
 
 
 NOTES = (
-    "Before of laws of one friction an answer named one, the friction was 18.3 N of "
-    "`axis_friction` and 3.4 N of `presliding`, with a sensor that is 0.7 ms late beside them.",
+    "While an answer could name two laws of one friction, it was 18.3 N of `axis_friction` and "
+    "3.4 N of `presliding`, with a sensor that is 0.7 ms late beside them.",
 )

@@ -18,7 +18,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from benchmarks.real.data import find
-from benchmarks.real.say import listed
+from benchmarks.real.say import listed, said
 from benchmarks.real.seals import SURE, predicted
 from kemba.identify.answer import Answer
 from kemba.identify.logs.reading import read_logs
@@ -68,8 +68,8 @@ compensation is moved by hand. Maps and model were chosen, and this was written,
 """
 USUAL = ("axis_scale", "axis_friction", "axis_damping", "axis_offset")
 HEAD = (
-    "| kept | drawing | published | discover | least squares, same effects | with gain, friction, "
-    "damping, offset | verdict | CPU s |",
+    "| kept | drawing | published | discover | least squares, same effects as far as linear "
+    "| with gain, friction, damping, offset | verdict | CPU s |",
     "|---|---|---|---|---|---|---|---|",
 )
 
@@ -120,6 +120,7 @@ def least_squares(
             "presliding": sign,
             "axis_damping": at["v"],
             "axis_offset": np.ones_like(at["v"]),
+            "sensor_bias:axis/q": np.cos(at["q"]),
             "extra_inertia": at["a"],
         }
         free = [laws[e] for e in effects if e in laws]
@@ -155,11 +156,6 @@ def split(names: Sequence[str], scratch: Path, download: bool) -> tuple[str, Ans
     )
     told = [", ".join(names), *(f"{e:.3f}" for e in errors), f"`{answer.verdict}`"]
     return f"| {' | '.join([*told, f'{seconds:.0f}'])} |", answer
-
-
-def said(answer: Answer) -> str:
-    """The answer's sentence, as a quotation."""
-    return f"> {answer.sentence}"
 
 
 def section(scratch: Path, download: bool) -> list[str]:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from kemba.config import dump_yaml
+from kemba.identify.answer import Answer
 from kemba.identify.rigs.characterise import characterise_logs
 from kemba.identify.workflow import discover_logs
 
@@ -11,10 +12,15 @@ Logs = Sequence[Path]
 SECONDS = 900.0  # for one search; the machine may be busy
 
 
+def said(answer: Answer) -> str:
+    """The answer's sentence, as a quotation."""
+    return f"> {answer.sentence}"
+
+
 def answered(logs: Logs, model: str, scratch: Path) -> list[str]:
     """The answer of `discover`: sentence and ranking."""
     answer, _ = discover_logs(logs, (), model, time_limit=SECONDS)
-    lines = [f"> {answer.sentence}", "", f"Verdict: `{answer.verdict}`.", ""]
+    lines = [said(answer), "", f"Verdict: `{answer.verdict}`.", ""]
     if answer.ranking:
         lines += ["| effect | probability | parameters | error after |", "|---|---|---|---|"]
     for row in answer.ranking[:6]:

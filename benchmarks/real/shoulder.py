@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.real.data import find
-from benchmarks.real.pendulum import least_squares, said
-from benchmarks.real.say import listed
+from benchmarks.real.pendulum import least_squares
+from benchmarks.real.say import listed, said
 from benchmarks.real.seals import predicted
 from kemba.identify.workflow import discover_logs
 from kemba.trajectory import Trajectory
@@ -30,7 +30,7 @@ time is kept in turn. Written before `discover` was asked:
 - Friction of 0.13 to 0.2 N.m is expected in all splits, with intervals that overlap, and held-out
   torque as good as by least squares with the same effects.
 
-| kept third | drawing | discover | least squares, same effects | verdict |
+| kept third | drawing | discover | least squares, same effects as far as linear | verdict |
 |---|---|---|---|---|"""
 
 NOTES = (

@@ -134,20 +134,22 @@ class JointFit:
         rows = self.covariance[np.ix_(keep, keep)].tolist()
         return Covariance(tuple(told[i] for i in keep), tuple(map(tuple, rows))) if rows else None
 
+    def _lead(self, candidate: Candidate) -> int | None:
+        """Index of an effect's leading parameter; None where it is not fitted, or told by a
+        reciprocal."""
+        told = candidate.key in self.names and np.isfinite(candidate.lead.off)
+        return self.names.index(candidate.key) if told else None
+
     def holds_absence(self, candidate: Candidate) -> bool:
         """Whether the interval of one effect's leading parameter holds its absence."""
-        key, off = candidate.key, candidate.lead.off
-        if key not in self.names or not np.isfinite(off):  # not fitted, or told by a reciprocal
-            return False
-        i = self.names.index(key)
-        return bool(self.low[i] <= off <= self.high[i])
+        i = self._lead(candidate)
+        return i is not None and bool(self.low[i] <= candidate.lead.off <= self.high[i])
 
     def share(self, candidate: Candidate) -> float:
-        """How far one effect's leading parameter is from absent, in its sizes."""
-        lead, key = candidate.lead, candidate.key
-        if key not in self.names or not np.isfinite(lead.off):
-            return np.inf
-        return float(abs(self.value[self.names.index(key)] - lead.off) / lead.size)
+        """How far one effect's leading parameter is from absent, in its sizes; infinite where it is
+        not told."""
+        i, lead = self._lead(candidate), candidate.lead
+        return np.inf if i is None else float(abs(self.value[i] - lead.off) / lead.size)
 
     def values(self, candidate: Candidate) -> dict[str, Value]:
         """The parameters of one effect, as the catalogue has them."""

@@ -202,11 +202,12 @@ class Search:
     def _afresh(self) -> None:
         """Refit every single effect from its usual size, and the machine from what its file says:
         from little of the effect, figures stay where they are not believed."""
-        for number, (effect, candidate) in enumerate(sorted(self.problem.candidates.items())):
+        points, singles = self.points, sorted(self.problem.candidates.items())
+        for number, (effect, candidate) in enumerate(singles, start=1):
             if self.ended:
                 break
-            self.say(Stage(f"refitting {effect}", number + 1, len(self.problem.candidates)))
-            lead, points = candidate.lead, self.points
+            self.say(Stage(f"refitting {effect}", number, len(singles)))
+            lead = candidate.lead
             for size in (lead.size, -lead.size) if lead.signed else (lead.size,):
                 start = {candidate.key: lead.off + size}
                 fit = refit(self.problem, (effect,), start, self.base.frozen)

@@ -53,14 +53,16 @@ def standing_candidates(model: Model) -> dict[str, Candidate]:
 
 
 def _sensor_sigmas(model: Model, logs: Sequence[RigLog]) -> dict[str, float]:
-    """Median noise of channels that may be wrong; a drive's force says what its motor does."""
+    """Median noise of channels that may be wrong, of an axis that turns no less than its zero is
+    set to; a drive's force says what its motor does."""
     rig, found = model.mechanism.rig, {}
     for name in model.mechanism.logged:
         if name == ANSWER[rig] == "axis/tau":
             continue
         place = name == PLACE[rig]
         sigmas = [log.q_sigma if place else log.sigma[name] for log in logs]
-        found[name] = float(np.median(sigmas))
+        turns = place and model.mechanism.logged[name] == "rad"
+        found[name] = max(float(np.median(sigmas)), ZERO if turns else 0.0)
     return found
 
 
@@ -73,8 +75,8 @@ LARGE = 95.0  # percentile of the rows that counts as the largest [%]
 FADING = 0.2  # rate at which a Stribeck friction fades, over the largest rate
 STRETCH = 1e-3  # travel until contacts slide, over the whole travel
 CUSHION = 0.1  # length of a cushion, over the whole travel
-# usual zero of an axis that turns [rad]: set by hand, to a degree, however little its encoder errs
-ZERO = 0.02
+ZERO = 0.005  # 1 sigma to which the zero of an axis is set by hand [rad]: a third of a degree
+ANY = (0.0, np.inf)  # a shape without limits of its own
 PERIODS = 300  # periods that are tried for a cogging force
 
 
@@ -100,8 +102,6 @@ def sized(
         if candidate.sensor and candidate.lead.unit == "s" and _hidden(predictor, logs, candidate):
             continue
         trial = candidate if candidate.sensor else _shaped(candidate, typical, predictor, limits)
-        if name == "sensor_bias:axis/q" and trial.lead.unit == "rad":
-            trial = replace(trial, lead=replace(trial.lead, size=max(trial.lead.size, ZERO)))
         theta = trial.typical()
         change = np.concatenate([predictor.gap(log, theta) for log in logs]) - base
         reach = float(np.percentile(np.abs(change), LARGE))
@@ -141,11 +141,10 @@ def _shaped(
         unit = (turns and param.rotary) or p.unit
         if name not in typical:
             return replace(p, unit=unit)
-        least, most = limits.get(name, (0.0, np.inf))
+        least, most = limits.get(name, ANY)
         lower = max(typical[name] / reach, param.lower, least)
         upper = min(typical[name] * reach, param.upper, most)
-        start = float(np.clip(typical[name], lower, upper))
-        return replace(p, unit=unit, typical=start, lower=lower, upper=upper)
+        return replace(p, unit=unit, typical=typical[name], lower=lower, upper=upper)
 
     shapes = tuple(map(fitting, candidate.shapes))
     return replace(candidate, lead=fitting(candidate.lead), shapes=shapes)
@@ -171,15 +170,14 @@ def _typical(
     found = {
         "stribeck_friction.v_b": FADING * fast,
         "axis_stribeck.v_b": FADING * fast,
-        "presliding.travel": max(STRETCH * travel, limits["presliding.travel"][0]),
+        "presliding.travel": STRETCH * travel,
         "end_cushion.L": CUSHION * travel,
     }
     if "cogging" in predictor.candidates:
-        period, phase = _strongest_period(
-            predictor, logs, limits.get("cogging.period", (0.0, np.inf))[1]
-        )
+        most = limits.get("cogging.period", ANY)[1]
+        period, phase = _strongest_period(predictor, logs, most)
         found |= {"cogging.period": period, "cogging.phase": phase}
-    return found
+    return {name: float(np.clip(value, *limits.get(name, ANY))) for name, value in found.items()}
 
 
 def _strongest_period(

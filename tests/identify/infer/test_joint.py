@@ -153,6 +153,7 @@ def test_an_interval_that_ends_at_the_absence_holds_it(
     low: float, high: float, holds: bool
 ) -> None:
     """As that of a parameter which cannot be negative, and ends at its bound."""
-    fit: Any = SimpleNamespace(names=("kick.a",), low=[low], high=[high])
+    ends = (np.array([x]) for x in (low, low, high))
+    fit = JointFit({}, ("kick.a",), *ends, np.eye(1))
     candidate: Any = SimpleNamespace(key="kick.a", lead=SimpleNamespace(off=0.0))
-    assert JointFit.holds_absence(fit, candidate) is holds
+    assert fit.holds_absence(candidate) is holds
