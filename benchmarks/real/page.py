@@ -54,10 +54,7 @@ RULES = (
         "size of a delay of the vessel's sensors",
         *("that of other rigs", "2 % of the log's length", "vessel"),
     ),
-    (
-        "an effect that explains little beside what the answer leaves",
-        *("named", "left out, below a tenth", "drive"),
-    ),
+    ("laws of one friction in an answer", *("as many as fit", "one", "drive, shoulder")),
     (
         "a unit of a drive's log that is called wrong: how much better the motion then tells the "
         "force",

@@ -16,7 +16,7 @@ from kemba.identify.infer.linear import (
     probabilities,
 )
 from kemba.identify.infer.null_model import Baseline, LinearisationPoint, with_learnt_colour
-from kemba.identify.infer.refit import Fit, Frozen, refit
+from kemba.identify.infer.refit import Fit, Frozen, RefitSettings, refit
 from kemba.identify.infer.windows import START
 from kemba.identify.problem.problem import Problem, Theta
 from kemba.identify.problem.sensor_faults import is_fault
@@ -42,9 +42,7 @@ SWAPPED = 2  # rounds in which effects of an answer are taken away or swapped
 LEADERS_GROWN = 3  # effects that are refitted beside the best answer
 LEADERS_SWAPPED = 2  # effects that are refitted in place of one of the answer
 ALONE = 3  # effects that are refitted because they gain most where no other is there at all
-# tolerances by which a figure is off on no machine that lacks nothing: in 100 of benchmarks/blind
-# 4.9 at most, where figures are known 1.5 times worse than declared
-BELIEVED = 5.5
+AT_BOUND = 0.01  # tolerances from its bound within which a figure is at it: rounding of a fit
 FAR_OFF = 0.1  # size of an effect from which its secant replaces its slope
 
 
@@ -186,14 +184,14 @@ class Search:
 
     @property
     def is_strained(self) -> bool:
-        """Whether the fit of nothing ends at a figure of the machine that nobody would believe.
+        """Whether the fit of nothing ends at the bound of a figure, where nobody would believe it.
         Slopes there say little of what is missing."""
         if self.problem.moves:
             return False
-        theta = self.points[NULL].fit.theta
+        theta, far = self.points[NULL].fit.theta, RefitSettings.bound - AT_BOUND
         figures = (n for n in self.problem.nuisance if not (n.startswith(START) or is_fault(n)))
         priors = ((n, *self.problem.nuisance[n]) for n in figures if n in theta)
-        return any(abs(theta[name] - mean) > BELIEVED * width for name, mean, width in priors)
+        return any(abs(theta[name] - mean) > far * width for name, mean, width in priors)
 
     def _gain(self) -> float:
         """Evidence [nats] of the best hypothesis over nothing."""

@@ -11,8 +11,6 @@ answer, and the windowed error of blocks that the fit has not seen may call for 
 - evidence claims too much: the rows of left-out blocks gain nothing by the larger answer, or more
   nats than their windows do, by more than one standard error. The first rule alone took true
   damping out of an answer on logs of the full plant: a few logs cannot tell a small gain from none.
-
-An effect that gains little beside what the answer leaves beyond the noise is left out as well.
 """
 
 from __future__ import annotations
@@ -37,10 +35,6 @@ from kemba.identify.infer.significance import LEAST
 from kemba.identify.infer.windows import error_ratio
 from kemba.identify.problem.problem import Problem
 from kemba.identify.problem.sensor_faults import is_fault
-
-# of what a larger answer leaves beyond the noise, what it must explain more: a tenth; 0.18
-# gives the same answer on a real drive, 0.04 a lag more
-SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -74,8 +68,8 @@ def simplest(search: Search, selection: Selection) -> Selection:
     _thin(search, best)
     known = [h for h in search.points if h and set(h) <= set(best)]  # it and its parts
     least = min(known, key=lambda h: window_powers(search, h).sum())
-    equal = [h for h in known if _is_enough(search, h, least)]
-    fine = [h for h in equal if overclaimed(search, h, best) or is_little(search, h, best)]
+    equal = [h for h in known if as_good(search, h, least)]
+    fine = [h for h in equal if overclaimed(search, h, best)]
     fine = fine or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
@@ -95,7 +89,7 @@ def _thin(search: Search, best: Hypothesis) -> None:
         _visit(search, smaller)
         rest = min(smaller, key=lambda h: window_powers(search, h).sum())
         least = min(least, rest, key=lambda h: window_powers(search, h).sum())
-        if not _is_enough(search, rest, least):
+        if not as_good(search, rest, least):
             break
 
 
@@ -139,9 +133,7 @@ def _instead(search: Search, selection: Selection, chosen: Hypothesis) -> Select
             continue
         if len(other) == len(chosen) and as_good(search, other, chosen):
             rivals.append(other)
-        elif _is_enough(search, chosen, other) or (
-            set(chosen) < set(other) and dropped & set(other)
-        ):
+        elif as_good(search, chosen, other) or (set(chosen) < set(other) and dropped & set(other)):
             dismissed.add(other)
     gone = [e for e in selection.best if e not in chosen]
     nats = search.points[selection.best].log_evidence - search.points[chosen].log_evidence
@@ -177,23 +169,6 @@ def as_good(search: Search, hypothesis: Hypothesis, best: Hypothesis) -> bool:
     of it, or with less than any evidence between them."""
     gain = window_gain(search, best, hypothesis)
     return not gain.pays or gain.nats < LEAST
-
-
-def _is_enough(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
-    """Whether the larger hypothesis is not needed beside the smaller one."""
-    return as_good(search, smaller, larger) or is_little(search, smaller, larger)
-
-
-def is_little(search: Search, smaller: Hypothesis, larger: Hypothesis) -> bool:
-    """Whether the larger hypothesis gains little beside what it leaves of left-out data beyond
-    their noise.
-
-    Where a motion repeats, so does what the model lacks: effects that imitate some of it predict
-    left-out data as well.
-    """
-    rows = search.points[larger].windowed.count.sum()
-    left = 0.5 * max(0.0, float(window_powers(search, larger).sum() - rows))
-    return window_gain(search, larger, smaller).nats < SHARE * left
 
 
 def selected(search: Search, best: Hypothesis, p_value: float) -> Selection:
