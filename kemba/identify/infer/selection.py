@@ -69,8 +69,7 @@ def simplest(search: Search, selection: Selection) -> Selection:
     known = [h for h in search.points if h and set(h) <= set(best)]  # it and its parts
     least = min(known, key=lambda h: window_powers(search, h).sum())
     equal = [h for h in known if as_good(search, h, least)]
-    fine = [h for h in equal if overclaimed(search, h, best)]
-    fine = fine or [best]
+    fine = [h for h in equal if overclaimed(search, h, best)] or [best]
     few = [h for h in fine if len(h) == min(map(len, fine))]
     chosen = max(few, key=lambda h: search.points[h].log_evidence)
     if chosen == best:
