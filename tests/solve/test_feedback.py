@@ -39,7 +39,13 @@ def test_feedback_keeps_to_what_the_table_alone_misses(tmp_path: Path) -> None:
     assert words_of(file).startswith(f"feedback by {found['feedback']['by']} (of 3 executions")
 
 
-@pytest.mark.parametrize(("late", "code"), [("1 ms", 1), ("25 ms", 0)], ids=["neither", "table"])
+@pytest.mark.parametrize(
+    ("late", "code"),
+    [
+        pytest.param("1 ms", 1, id="neither", marks=pytest.mark.slow),  # a minute
+        pytest.param("25 ms", 0, id="table"),
+    ],
+)
 def test_feedback_is_kept_only_where_it_decides(late: str, code: int, tmp_path: Path) -> None:
     assert solved(tmp_path / "run", late) == code
     found = read_json(tmp_path / "run" / "certificate.json")
