@@ -149,14 +149,18 @@ class Continuation:
         x = with_impacts(program, x, Continuing.ease) if kept is None else kept
         if self.origin.finer and kept is not None:
             program, x = refiner.build(mesh.phases, (program, x), RADAU9)
-        if self.origin.ticks:
-            on_ticks(program, x)
         begin = Iterate(x)
-        if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
-            begin = mesh.stages.iterate(program, x)
         options = warm(min(Continuing.iterations, self.task.solver.max_iterations))
         mu = ipopt.last_barrier(Refining.tol)
         known: dict[str, Any] = {}
+
+        def ticks(program: PhaseProgram) -> None:
+            if self.origin.ticks:
+                on_ticks(program, x)
+
+        ticks(program)
+        if mesh.stages is not None and mesh.stages.phases == tuple(mesh.phases):
+            begin = mesh.stages.iterate(program, x)
         if begin.lam_g is not None:
             # a multiplier is at least that of a bound at distance 1
             known = ipopt.warm(mu, Continuing.push, warm_start_mult_bound_push=mu)
@@ -164,6 +168,8 @@ class Continuation:
             known = ipopt.central(mu, Refining.push)
         stagnation = Stagnation(Continuing.patience, Continuing.underway, Refining.slow)
         found = solve_along(program, begin, options | known, self.control, stagnation)
+        if not found.solved and kept is not None:
+            program, found = refiner.finer(mesh.phases, (program, x), program.scheme, ticks)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)

@@ -56,6 +56,8 @@ class Refining:
     mirrored = 1e-6
     # of a mode violated by its scale; at a lower price modes that can hold are violated too
     price = 1000.0
+    # the same in the last solve: multipliers of rates in elements of 0.2 ms are above 1e4
+    last_price = 1e5
     near = 10.0  # proximal weight of the first solve; without, short steps wander off
     # the same of elastic solves; where it is large beside the price, modes that can hold are
     # violated

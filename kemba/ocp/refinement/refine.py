@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,7 +12,7 @@ from kemba.events import LASTS
 from kemba.model import Model
 from kemba.ocp.certificate.certify import Certificate
 from kemba.ocp.nlp.ending import Ending
-from kemba.ocp.nlp.ipopt import Control, Iterate
+from kemba.ocp.nlp.ipopt import Control, Iterate, central
 from kemba.ocp.phases.between import add_missed
 from kemba.ocp.phases.mesh import meshed
 from kemba.ocp.phases.mode_constraints import (
@@ -26,7 +26,15 @@ from kemba.ocp.phases.program import PhaseProgram
 from kemba.ocp.phases.radau import RADAU3, RADAU5, RADAU9, STATE, Scheme
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
-from kemba.ocp.refinement.repair import Solution, misfits, repaired, simplified, with_pulses
+from kemba.ocp.refinement.repair import (
+    Misfit,
+    Solution,
+    misfits,
+    repaired,
+    settled,
+    simplified,
+    with_pulses,
+)
 from kemba.ocp.refinement.start import (
     carried,
     certificate,
@@ -53,9 +61,11 @@ from kemba.trajectory import Trajectory
 Order = list[tuple[tuple[int, ...], tuple[float, ...]]]  # modes and valves, phase by phase
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
 UNFIT = "no order of its contacts and stops was found that holds"
-NEAREST, BEST, FINEST = range(3)  # steps of an elastic program
+NEAREST, BEST, FINER = range(3)  # steps of an elastic program
 FULL = 0.999  # of its longest duration: an element on its bound
 SEVERAL = 3  # elements of a phase, on average
+ALONE = 3  # misfits of an order of modes that are repaired one by one
+KEPT = 5  # orders of modes that are kept in mind
 SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
@@ -116,6 +126,22 @@ def refine(
         return Refined(None, None, Ending.UNSUITABLE, refiner.iterations, reason=str(error))
     except ValueError as error:
         return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
+
+
+@dataclass(frozen=True)
+class Misfitting:
+    """An order of modes that does not fit: the step of its elastic program at which that showed,
+    and what is violated in the solution x (size,)."""
+
+    step: int
+    program: PhaseProgram
+    x: np.ndarray
+    wrong: Sequence[Misfit]
+
+    @property
+    def score(self) -> tuple[int, float]:
+        """Better ones are smaller: how far it came, how much is violated."""
+        return -self.step, sum(misfit.size for misfit in self.wrong)
 
 
 @dataclass
@@ -192,41 +218,61 @@ class Refiner:
     def repair(self, phases: list[Phase], found: Refined) -> Refined:
         """The solution on phases repaired until their modes fit, else how the last try ended.
 
-        All programs are elastic: the nearest, the best, and that more exactly. Where one violates
-        modes, they are repaired, and the nearest is solved again from there.
+        All programs are elastic, also the last one: modes that fit are kept to the solver's
+        tolerance, while rows without slacks depend on each other where elements are short, and
+        IPOPT may not converge on them. Repairs are sought best first: those of the order of modes
+        that came furthest and is violated least.
         """
+        known: list[Misfitting] = []
         start: Start = self.plan
-        while phases not in self.seen and self.left > 0:
+        while self.left > 0:
             self.seen.append(phases)
             self.tell("phases: changing the order of contacts and valves")
-            for step in (NEAREST, BEST, FINEST):
+            for step in (NEAREST, BEST, FINER):
                 program, near = self.elastic(phases, start, step)
                 start, found = (program, near.Y), ended(program, near)
-                if not near.solved:
+                if found.ending.cut_short:
                     return found
-                wrong = misfits(program, near.Y)
+                if not near.solved:
+                    break
+                wrong = misfits(program, near.Y, Refining.rough_rows)
                 if wrong:
                     found = replace(found, reason=UNFIT)
+                    known = [*known, Misfitting(step, program, near.Y, wrong)]
+                    known = sorted(known, key=lambda one: one.score)[:KEPT]
                     break
                 phases = self.evened(program, near)
             else:
-                return self.fine(program, near)
-            better = repaired(program, wrong, self.marks(program.nodes))
+                found = self.fine(phases, start)
+                if found.done:
+                    return found
+            better = self.better(known)
             if better is None:
                 break
-            phases = better
+            phases, start = better
         return found
+
+    def better(self, known: Sequence[Misfitting]) -> tuple[list[Phase], Start] | None:
+        """Phases that were not tried yet, and from where: with all misfits of the best of the
+        `known` orders repaired, then with each of its worst alone; None where nothing is left."""
+        for one in known:
+            worst = sorted(one.wrong, key=lambda misfit: -misfit.size)[:ALONE]
+            for part in (one.wrong, *([misfit] for misfit in worst)):
+                phases = repaired(one.program, part, self.marks(one.program.nodes))
+                if phases is not None and phases not in self.seen:
+                    return phases, (one.program, one.x)
+        return None
 
     def elastic(
         self, phases: Sequence[Phase], start: Start, step: int
     ) -> tuple[PhaseProgram, Iterate]:
         """The elastic program of a step: near the start by the coarser scheme, then for the task's
         cost, then for that near the start by the finer scheme."""
-        scheme = RADAU5 if step == FINEST else RADAU3
+        scheme = RADAU5 if step == FINER else RADAU3
         program, x = self.build(phases, start, scheme, Refining.price)
         if step != BEST:
             x = program.proximal(x, Refining.near_elastic)
-        options = (warm if step == FINEST else rough)(Refining.long_iterations)
+        options = (warm if step == FINER else rough)(Refining.long_iterations)
         options["mu_init"] = Refining.elastic_mu / 10**step
         return program, self._solve(program, program.loosened(x), options)
 
@@ -260,29 +306,42 @@ class Refiner:
             if simpler is not None:
                 return simpler
         for way in [best] * best.solved + [nearest] * (not found.done):
-            found = self.fine(program, way)
+            found = self.fine(near.phases, (program, way.Y))
             if found.done:
                 break
         return found
 
-    def fine(self, coarser: PhaseProgram, start: Iterate) -> Refined:
-        """The exact program with the finer scheme, from a solution with the coarser one; once more
-        on other elements where a phase would last longer than its own can."""
+    def fine(self, phases: Sequence[Phase], near: Start) -> Refined:
+        """The solution by the finer scheme from one `near`; once more on other elements where a
+        phase would last longer than its own can."""
         self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
-        solution = self._finer(coarser.phases, coarser, start)
-        phases = self.evened(*solution) if solution[1].solved else coarser.phases
-        if phases != coarser.phases:
+        solution = self.finer(phases, near, RADAU5)
+        even = self.evened(*solution) if solution[1].solved else phases
+        if even != phases:
             self.tell("phases: on elements shared by how long phases last")
-            even = self._finer(phases, *solution)
-            solution = even if even[1].solved else solution
+            again = self.finer(even, (solution[0], solution[1].Y), RADAU5)
+            solution = again if again[1].solved else solution
         if solution[1].solved:
             self.solution = solution
         return read(*solution)
 
-    def _finer(self, phases: Sequence[Phase], other: PhaseProgram, start: Iterate) -> Solution:
-        """The exact program of phases in the order of those of another one, solved from there."""
-        program, x = self.build(phases, (other, start.Y), RADAU5)
-        return program, self._solve(program, x, warm(Refining.long_iterations))
+    def finer(
+        self,
+        phases: Sequence[Phase],
+        near: Start,
+        scheme: Scheme,
+        more: Callable[[PhaseProgram], None] = lambda program: None,
+    ) -> Solution:
+        """The program of a finer scheme solved for the task's cost, from a start `near` its
+        solution; not solved where modes do not fit. `more` adds rows to it."""
+        program, x = self.build(phases, near, scheme, Refining.last_price)
+        more(program)
+        options = warm(Refining.long_iterations) | central(Refining.mu, Refining.push)
+        found = self._solve(program, program.loosened(x), options)
+        if not found.solved:
+            return program, found
+        fits = not misfits(program, found.Y, Refining.rows)
+        return program, settled(program, found if fits else replace(found, ending=Ending.GAVE_UP))
 
     def evened(self, program: PhaseProgram, found: Iterate) -> list[Phase]:
         """The phases of a program; where one of them lasts as long in a solution as its elements
@@ -323,8 +382,8 @@ class Refiner:
 
     def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
-        exact = program.scheme is not RADAU3 and not program.elastic
-        found = (solve_along if exact else solve)(program, Iterate(start), options, self.control)
+        last = program.scheme is not RADAU3 and program.elastic != Refining.price
+        found = (solve_along if last else solve)(program, Iterate(start), options, self.control)
         self.iterations += found.iterations
         return found
 

@@ -40,18 +40,28 @@ class Misfit(NamedTuple):
     size: float
 
 
-def misfits(program: PhaseProgram, x: np.ndarray) -> list[Misfit]:
+def misfits(program: PhaseProgram, x: np.ndarray, rows: float) -> list[Misfit]:
     """What an elastic program violates at `x` (size,), scaled variables, in the order of time.
 
-    With an exact penalty, slacks of modes that fit are zero to the solver's tolerance.
+    With an exact penalty, slacks of modes that fit are zero to the tolerance `rows` of its rows.
     """
-    found, fits = [], FITS * Refining.rough_rows
+    found, fits = [], FITS * rows
     for soft in program.soft:
         for way, side in ((soft.above, 1), (soft.below, -1)):
             for e, size in zip(soft.elements, x[way], strict=True) if way is not None else ():
                 if size > fits:
                     found.append(Misfit(int(e), soft.constraint, soft.kind, side, float(size)))
     return sorted(found)
+
+
+def settled(program: PhaseProgram, found: Iterate) -> Iterate:
+    """A solution of an elastic program as one of the same program without slacks."""
+    x = found.Y.copy()
+    for soft in program.soft:
+        for slack in (soft.above, soft.below):
+            if slack is not None:
+                x[slack] = 0.0
+    return replace(found, Y=x, objective=float(program.problem.grad_f(x, [])[0]))
 
 
 def repaired(
