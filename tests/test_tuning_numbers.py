@@ -120,7 +120,6 @@ CONSTANTS = {  # file -> names, why
     "identify/design/robot.py": ("STANDARD", "the motion that others are compared with"),
     "errors.py": ("LISTED PART FEW", "length of messages"),
     "folders.py": ("PROBE MANY", "free space that a run takes; length of messages"),
-    "ocp/refinement/refine.py": ("SOLVES", "a count that progress shows"),
     "ocp/refinement/start.py": ("WORST", "violations that a report lists"),
     "sweep/farm.py": ("ENVIRONMENT", "environment of workers"),
     "units.py": ("USUAL", "powers and sizes of units"),

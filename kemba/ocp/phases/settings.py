@@ -39,7 +39,6 @@ class Elements:
 
     shortest = 0.03  # times the nominal step: shortest element
     longest = 2.0  # the same of the longest; on longer ones two stages err, for lower costs
-    collapsed = 3.0  # times the shortest duration: a phase that short has collapsed
     # of a state's range: room below its lower bound, since a vented chamber stays exactly there;
     # without it IPOPT did not converge
     vented = 0.01
@@ -50,18 +49,17 @@ class Refining:
     """How a refinement is solved."""
 
     iterations = 1200  # of all solves together
-    rough_iterations = 60  # iterations of a solve by the coarser scheme, and of one with a pulse
-    long_iterations = 200  # iterations of an elastic solve, and of one by the finer scheme
+    long_iterations = 200  # of a solve
+    pulse_iterations = 60  # of one with another pulse
     # scaled: a plan nearer to its mirror image is solved by half; the certificate's tolerance
     mirrored = 1e-6
     # of a mode violated by its scale; at a lower price modes that can hold are violated too
     price = 1000.0
     # the same in the last solve: multipliers of rates in elements of 0.2 ms are above 1e4
     last_price = 1e5
-    near = 10.0  # proximal weight of the first solve; without, short steps wander off
-    # the same of elastic solves; where it is large beside the price, modes that can hold are
-    # violated
-    near_elastic = 0.01
+    # proximal weight of solves near a start; where it is large beside the price, modes that can
+    # hold are violated
+    near = 0.01
     # m; a foot this near to what it keeps off between nodes cuts its corner without a row there (a
     # hurdle of 0.2 m with five stages an element: by 36 mm, and no solution with rows added after)
     near_rows = 5e-3
@@ -80,8 +78,6 @@ class Refining:
     permuting = 0
     # max_hessian_perturbation; beyond, tries cost a second an iteration and lead nowhere
     hessian = 1e6
-    stagnation_iterations = 30  # without a smaller violation, after which a solve is given up
-    stagnation_near = 1e-4  # scaled violation from which the next solve may begin
     # usual iterations whose time long ones may cost together: solves that converged lost 21 at
     # most, those that took a minute 50 to 300
     slow = 40.0

@@ -27,12 +27,12 @@ from kemba.ocp.phases.radau import RADAU3, RADAU5, RADAU9, STATE, Scheme
 from kemba.ocp.phases.settings import Refining
 from kemba.ocp.phases.stages import Stages
 from kemba.ocp.refinement.repair import (
-    Misfit,
+    Misfitting,
     Solution,
+    best_first,
     misfits,
-    repaired,
+    next_repair,
     settled,
-    simplified,
     with_pulses,
 )
 from kemba.ocp.refinement.start import (
@@ -62,11 +62,9 @@ Order = list[tuple[tuple[int, ...], tuple[float, ...]]]  # modes and valves, pha
 Start = Trajectory | tuple[PhaseProgram, np.ndarray]  # nodes, or the scaled variables of a program
 UNFIT = "no order of its contacts and stops was found that holds"
 NEAREST, BEST, FINER = range(3)  # steps of an elastic program
+STEPS = ("near the plan", "the best plan", "the best plan, more exactly")
 FULL = 0.999  # of its longest duration: an element on its bound
 SEVERAL = 3  # elements of a phase, on average
-ALONE = 3  # misfits of an order of modes that are repaired one by one
-KEPT = 5  # orders of modes that are kept in mind
-SOLVES = 3  # of a plan whose phases fit: the nearest, the best, and that more exactly
 
 
 @dataclass(frozen=True)
@@ -128,25 +126,9 @@ def refine(
         return Refined(None, None, Ending.UNSUITABLE, 0, reason=f"the model {error}")
 
 
-@dataclass(frozen=True)
-class Misfitting:
-    """An order of modes that does not fit: the step of its elastic program at which that showed,
-    and what is violated in the solution x (size,)."""
-
-    step: int
-    program: PhaseProgram
-    x: np.ndarray
-    wrong: Sequence[Misfit]
-
-    @property
-    def score(self) -> tuple[int, float]:
-        """Better ones are smaller: how far it came, how much is violated."""
-        return -self.step, sum(misfit.size for misfit in self.wrong)
-
-
 @dataclass
 class Refiner:
-    """Reads the modes of a plan, solves, and repairs modes that do not fit, until one solves."""
+    """Reads the modes of a plan, solves, and repairs modes that do not fit, until they do."""
 
     model: Model
     task: Task
@@ -175,9 +157,7 @@ class Refiner:
             phases = self.phases(trim)
             if phases in self.seen:
                 break
-            found = self.exact(phases, self.plan)
-            if not found.done:
-                found = self.repair(phases, found)
+            found = self.solved(phases)
             if found.done:
                 break
         return replace(found, iterations=self.iterations)
@@ -215,8 +195,8 @@ class Refiner:
         keeps = made.certificate is not None and made.certificate.within(self.task.tolerances)
         return made if keeps else found
 
-    def repair(self, phases: list[Phase], found: Refined) -> Refined:
-        """The solution on phases repaired until their modes fit, else how the last try ended.
+    def solved(self, phases: list[Phase]) -> Refined:
+        """The solution on phases, repaired until their modes fit, else how the last try ended.
 
         All programs are elastic, also the last one: modes that fit are kept to the solver's
         tolerance, while rows without slacks depend on each other where elements are short, and
@@ -225,10 +205,13 @@ class Refiner:
         """
         known: list[Misfitting] = []
         start: Start = self.plan
+        found = Refined(None, None, Ending.ITERATION_LIMIT, 0)
         while self.left > 0:
+            if self.seen:
+                self.tell("phases: changing the order of contacts and valves")
             self.seen.append(phases)
-            self.tell("phases: changing the order of contacts and valves")
-            for step in (NEAREST, BEST, FINER):
+            for step, name in enumerate(STEPS):
+                self.tell(Stage(f"phases: {name}", step + 1, len(STEPS)))
                 program, near = self.elastic(phases, start, step)
                 start, found = (program, near.Y), ended(program, near)
                 if found.ending.cut_short:
@@ -238,30 +221,18 @@ class Refiner:
                 wrong = misfits(program, near.Y, Refining.rough_rows)
                 if wrong:
                     found = replace(found, reason=UNFIT)
-                    known = [*known, Misfitting(step, program, near.Y, wrong)]
-                    known = sorted(known, key=lambda one: one.score)[:KEPT]
+                    known = best_first([*known, Misfitting(step, program, near.Y, wrong)])
                     break
                 phases = self.evened(program, near)
             else:
                 found = self.fine(phases, start)
                 if found.done:
                     return found
-            better = self.better(known)
+            better = next_repair(known, self.seen, self.marks)
             if better is None:
                 break
             phases, start = better
         return found
-
-    def better(self, known: Sequence[Misfitting]) -> tuple[list[Phase], Start] | None:
-        """Phases that were not tried yet, and from where: with all misfits of the best of the
-        `known` orders repaired, then with each of its worst alone; None where nothing is left."""
-        for one in known:
-            worst = sorted(one.wrong, key=lambda misfit: -misfit.size)[:ALONE]
-            for part in (one.wrong, *([misfit] for misfit in worst)):
-                phases = repaired(one.program, part, self.marks(one.program.nodes))
-                if phases is not None and phases not in self.seen:
-                    return phases, (one.program, one.x)
-        return None
 
     def elastic(
         self, phases: Sequence[Phase], start: Start, step: int
@@ -271,50 +242,14 @@ class Refiner:
         scheme = RADAU5 if step == FINER else RADAU3
         program, x = self.build(phases, start, scheme, Refining.price)
         if step != BEST:
-            x = program.proximal(x, Refining.near_elastic)
+            x = program.proximal(x, Refining.near)
         options = (warm if step == FINER else rough)(Refining.long_iterations)
         options["mu_init"] = Refining.elastic_mu / 10**step
         return program, self._solve(program, program.loosened(x), options)
 
-    def exact(self, phases: Sequence[Phase], start: Start) -> Refined:
-        """The solution nearest to the plan by the coarser scheme, then the best one by both."""
-        program, x = self.build(phases, start, RADAU3)
-        self.tell(Stage("phases: near the plan", 1, SOLVES))
-        options = rough(Refining.rough_iterations)
-        found = self._solve(program, program.proximal(x, Refining.near), options)
-        if not found.solved:
-            return ended(program, found)
-        return self.simpler(program, found.Y) or self.finish(program, found)
-
-    def simpler(self, program: PhaseProgram, x: np.ndarray) -> Refined | None:
-        """The solution without the phases that collapsed in `x` (size,); None where there is
-        none."""
-        phases = simplified(program, x, self.marks(program.nodes))
-        if phases is None or self.left <= 0:
-            return None
-        found = self.exact(phases, (program, x))
-        return found if found.done else None
-
-    def finish(self, near: PhaseProgram, nearest: Iterate) -> Refined:
-        """An exact solution, from the nearest one with the coarser scheme first."""
-        self.tell(Stage("phases: the best plan", 2, SOLVES))
-        program, start = self.build(near.phases, self.plan, RADAU3)
-        best = self._solve(program, nearest.Y[: len(start)], rough(Refining.rough_iterations))
-        found = ended(program, best)
-        if best.solved:
-            simpler = self.simpler(program, best.Y)
-            if simpler is not None:
-                return simpler
-        for way in [best] * best.solved + [nearest] * (not found.done):
-            found = self.fine(near.phases, (program, way.Y))
-            if found.done:
-                break
-        return found
-
     def fine(self, phases: Sequence[Phase], near: Start) -> Refined:
         """The solution by the finer scheme from one `near`; once more on other elements where a
         phase would last longer than its own can."""
-        self.tell(Stage("phases: the best plan, more exactly", 3, SOLVES))
         solution = self.finer(phases, near, RADAU5)
         even = self.evened(*solution) if solution[1].solved else phases
         if even != phases:

@@ -21,7 +21,7 @@ from kemba.ocp.nlp.ending import Stagnation
 from kemba.ocp.nlp.ipopt import Control, Iterate
 from kemba.ocp.phases.modes import AHEAD, BACK, HELD, OPEN, Phase
 from kemba.ocp.phases.program import PhaseProgram
-from kemba.ocp.phases.settings import Elements, Refining
+from kemba.ocp.phases.settings import Refining
 from kemba.ocp.refinement.start import carried, solve_along, warm
 from kemba.ocp.transcription.layout import STEP
 
@@ -52,6 +52,48 @@ def misfits(program: PhaseProgram, x: np.ndarray, rows: float) -> list[Misfit]:
                 if size > fits:
                     found.append(Misfit(int(e), soft.constraint, soft.kind, side, float(size)))
     return sorted(found)
+
+
+@dataclass(frozen=True)
+class Misfitting:
+    """Modes that do not fit: at which step of its elastic programs that showed, and what is
+    violated in the solution x (size,) there."""
+
+    step: int
+    program: PhaseProgram
+    x: np.ndarray
+    wrong: Sequence[Misfit]
+
+    @property
+    def score(self) -> tuple[int, float]:
+        """Better ones are smaller: how far it came, how much is violated."""
+        return -self.step, sum(misfit.size for misfit in self.wrong)
+
+
+ALONE = 3  # misfits that are repaired one by one: further ones are far smaller, or follow
+KEPT = 5  # orders of modes: each holds a program
+
+
+def best_first(known: Sequence[Misfitting]) -> list[Misfitting]:
+    """The best of the orders of modes, the best one first."""
+    return sorted(known, key=lambda one: one.score)[:KEPT]
+
+
+def next_repair(
+    known: Sequence[Misfitting],
+    seen: Sequence[Sequence[Phase]],
+    marks: Callable[[int], Sequence[int]],
+) -> tuple[list[Phase], tuple[PhaseProgram, np.ndarray]] | None:
+    """Phases that were not `seen` yet, and the program and solution that they begin from: all
+    misfits of the first of the `known` orders are repaired, then each of its worst alone, then
+    those of the next. None where nothing is left. `marks`: where phases end on so many nodes."""
+    for one in known:
+        worst = sorted(one.wrong, key=lambda misfit: -misfit.size)[:ALONE]
+        for part in (one.wrong, *([misfit] for misfit in worst)):
+            phases = repaired(one.program, part, marks(one.program.nodes))
+            if phases is not None and phases not in seen:
+                return phases, (one.program, one.x)
+    return None
 
 
 def settled(program: PhaseProgram, found: Iterate) -> Iterate:
@@ -123,23 +165,6 @@ def _other(modes: np.ndarray, misfit: Misfit) -> int:
     return HELD if kind in slides else mode
 
 
-def simplified(program: PhaseProgram, x: np.ndarray, marks: Sequence[int]) -> list[Phase] | None:
-    """Phases without those that collapsed between two others; None where none did.
-
-    `x` (size,): scaled variables.
-    """
-    h = x[program.columns.h[:, 0]] * program.layout.scale[program.layout.slices["h"]][0]
-    shortest = Elements.shortest * program.task.duration / program.nodes
-    phases = list(program.phases)
-    for p in range(1, len(phases) - 1):
-        around = (phases[p - 1].modes, phases[p + 1].modes)
-        brief = h[p] * phases[p].elements <= Elements.collapsed * shortest
-        if brief and phases[p].modes not in around:
-            phases[p] = replace(phases[p], modes=_nearest_modes(phases, p))
-    found = merged(phases, marks)
-    return None if found == merged(program.phases, marks) else found
-
-
 def merged(phases: Sequence[Phase], marks: Sequence[int]) -> list[Phase]:
     """Neighbours with the same modes and valves as one phase, except across `marks`."""
     found = [phases[0]]
@@ -151,17 +176,6 @@ def merged(phases: Sequence[Phase], marks: Sequence[int]) -> list[Phase]:
         else:
             found.append(phase)
     return found
-
-
-def _nearest_modes(phases: Sequence[Phase], p: int) -> tuple[int, ...]:
-    """The modes of the neighbour that differ least, the longer neighbour's if both do."""
-    sides = [phases[p - 1], phases[p + 1]]
-
-    def distance(other: Phase) -> tuple[int, int]:
-        differ = sum(a != b for a, b in zip(other.modes, phases[p].modes, strict=True))
-        return (differ or len(other.modes) + 1, -other.elements)
-
-    return min(sides, key=distance).modes
 
 
 PAYS = 0.02  # of the cost: a smaller gain is within what starts differ by
@@ -263,5 +277,5 @@ def with_pulses(
 def _solved(program: PhaseProgram, start: Iterate, control: Control) -> Solution | None:
     """A program with its solution; None where it has none near."""
     stagnation = Stagnation(PATIENCE, UNDERWAY, Refining.slow)
-    found = solve_along(program, start, warm(Refining.rough_iterations), control, stagnation)
+    found = solve_along(program, start, warm(Refining.pulse_iterations), control, stagnation)
     return (program, found) if found.solved else None

@@ -132,13 +132,8 @@ def solve(
     control: Control,
     stagnation: Stagnation | None = None,
 ) -> Iterate:
-    """The program solved from `start`; given up where the violation stagnates, by default as the
-    settings say."""
+    """The program solved from `start`; given up where `stagnation` is found."""
     own = {**program.task.solver.options, **exact(), **options}
-    longest = Refining.stagnation_iterations, Refining.stagnation_near, Refining.slow
-    if program.elastic > 0.0:  # such a program has a solution
-        stagnation = Stagnation(np.inf, 0.0)
-    stagnation = stagnation or Stagnation(*longest)
     return Ipopt(program, own, control).solve(start, stagnation=stagnation)
 
 
