@@ -195,7 +195,7 @@ def test_a_contact_that_cannot_be_is_found_and_taken_out() -> None:
     tried = refiner(euler)
     k, wrong = wrong_touch(found.phases, tried.marks(len(euler.trajectory) - 1))
     program, near = tried.elastic(wrong, euler.trajectory, NEAREST)
-    violated = misfits(program, near.Y, Refining.rough_rows)
+    violated = misfits(program, near.Y)
     worst = max(violated, key=lambda misfit: misfit.size)
     assert (worst.constraint, worst.element, worst.kind) == (0, k, "touch")
     assert repaired(program, violated, tried.marks(len(euler.trajectory) - 1)) == list(found.phases)

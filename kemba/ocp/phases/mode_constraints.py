@@ -122,7 +122,8 @@ def _gaps(program: PhaseProgram, view: View, i: int, constraint: Constraint) -> 
     closing = {phases[p].first: p for p in program.impacts if program.closes(p, i)}
     closed = np.array([phases[p].active(i) for p in c.phase_of])
     near = max(ModeConstraints.away, round(ModeConstraints.away_share * program.nodes))
-    away = np.convolve(closed, np.ones(2 * near + 1), "same") < 1  # of a closed element
+    beyond = np.pad(closed, near, constant_values=True)  # the ends, too: the task may have it touch
+    away = np.convolve(beyond, np.ones(2 * near + 1), "valid") < 1  # of a closed element
     g = view.of(constraint.gap) / LENGTH
     for clear in (False, True):
         apart: Where = [

@@ -218,7 +218,7 @@ class Refiner:
                     return found
                 if not near.solved:
                     break
-                wrong = misfits(program, near.Y, Refining.rough_rows)
+                wrong = misfits(program, near.Y)
                 if wrong:
                     found = replace(found, reason=UNFIT)
                     known = best_first([*known, Misfitting(step, program, near.Y, wrong)])
@@ -275,7 +275,7 @@ class Refiner:
         found = self._solve(program, program.loosened(x), options)
         if not found.solved:
             return program, found
-        fits = not misfits(program, found.Y, Refining.rows)
+        fits = not misfits(program, found.Y, self.task.tolerances.bounds)
         return program, settled(program, found if fits else replace(found, ending=Ending.GAVE_UP))
 
     def evened(self, program: PhaseProgram, found: Iterate) -> list[Phase]:

@@ -27,7 +27,7 @@ from kemba.ocp.transcription.layout import STEP
 
 Solution = tuple[PhaseProgram, Iterate]
 FAR = 0.1  # of the worst misfit
-FITS = 10.0  # times the tolerance of rows: a larger slack is no rounding
+FITS = 10.0 * Refining.rough_rows  # a larger slack is no rounding
 
 
 class Misfit(NamedTuple):
@@ -40,12 +40,11 @@ class Misfit(NamedTuple):
     size: float
 
 
-def misfits(program: PhaseProgram, x: np.ndarray, rows: float) -> list[Misfit]:
-    """What an elastic program violates at `x` (size,), scaled variables, in the order of time.
-
-    With an exact penalty, slacks of modes that fit are zero to the tolerance `rows` of its rows.
+def misfits(program: PhaseProgram, x: np.ndarray, fits: float = FITS) -> list[Misfit]:
+    """What an elastic program violates by more than `fits` at `x` (size,), scaled variables, in the
+    order of time. With an exact penalty, slacks of modes that fit are zero to its tolerance.
     """
-    found, fits = [], FITS * rows
+    found: list[Misfit] = []
     for soft in program.soft:
         for way, side in ((soft.above, 1), (soft.below, -1)):
             for e, size in zip(soft.elements, x[way], strict=True) if way is not None else ():
