@@ -141,6 +141,16 @@ def test_phases_cover_the_motion_and_touch_down_once_for_a_clean_jump() -> None:
     assert firsts[1:] == [phase.last for phase in found.phases[:-1]]
 
 
+def test_a_stop_that_the_task_has_touched_at_an_end_need_not_be_clear_at_once() -> None:
+    """It may be left with the first element: clear of it from there on no motion could be."""
+    euler, found = both(*CASES[1])
+    opened = [replace(phase, modes=(phase.modes[0], OPEN, OPEN)) for phase in found.phases]
+    program, _ = refiner(euler).build(opened, euler.trajectory, RADAU3)
+    last, away = program.nodes, ModeConstraints.away
+    clear = [row.node for row in program.rows if "end_stop" in row.label and row.lower > 0.0]
+    assert set(clear) == set(range(away + 1, last - away + 1))
+
+
 @pytest.mark.parametrize(("name", "override"), QUICK)
 def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> None:
     euler, found = both(name, override)
@@ -152,7 +162,8 @@ def test_open_gaps_keep_clear_away_from_touches(name: str, override: str) -> Non
         gap = ca.Function("gap", [node.q], [constraint.gap]).map(len(x["q"]))
         values = np.array(gap(x["q"].T)).ravel()[1:]
         closed = np.array([p.active(i) for p in found.phases for _ in range(p.elements)])
-        free = [not closed[max(e - away, 0) : e + away + 1].any() for e in range(len(closed))]
+        beyond = np.pad(closed, away, constant_values=True)
+        free = [not beyond[e : e + 2 * away + 1].any() for e in range(len(closed))]
         assert values[free].min(initial=np.inf) >= clear - 1e-9
 
 

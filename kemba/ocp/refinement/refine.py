@@ -238,9 +238,12 @@ class Refiner:
         self, phases: Sequence[Phase], start: Start, step: int
     ) -> tuple[PhaseProgram, Iterate]:
         """The elastic program of a step: near the start by the coarser scheme, then for the task's
-        cost, then for that near the start by the finer scheme."""
-        scheme = RADAU5 if step == FINER else RADAU3
-        program, x = self.build(phases, start, scheme, Refining.price)
+        cost, then for that near the start by the finer scheme, at a price at which no slacks are
+        left but where modes do not fit."""
+        scheme, price = RADAU3, Refining.price
+        if step == FINER:
+            scheme, price = RADAU5, Refining.last_price
+        program, x = self.build(phases, start, scheme, price)
         if step != BEST:
             x = program.proximal(x, Refining.near)
         options = (warm if step == FINER else rough)(Refining.long_iterations)
@@ -317,8 +320,8 @@ class Refiner:
 
     def _solve(self, program: PhaseProgram, start: np.ndarray, options: dict[str, Any]) -> Iterate:
         options = {**options, "max_iter": max(0, min(options["max_iter"], self.left))}
-        last = program.scheme is not RADAU3 and program.elastic != Refining.price
-        found = (solve_along if last else solve)(program, Iterate(start), options, self.control)
+        way = solve if program.scheme is RADAU3 else solve_along
+        found = way(program, Iterate(start), options, self.control)
         self.iterations += found.iterations
         return found
 
