@@ -56,7 +56,7 @@ class Refining:
     # of a mode violated by its scale; at a lower price modes that can hold are violated too
     price = 1000.0
     # the same by the finer scheme: multipliers of rates in elements of 0.2 ms are above 1e4
-    last_price = 1e5
+    finer_price = 1e5
     # proximal weight of solves near a start; where it is large beside the price, modes that can
     # hold are violated
     near = 0.01

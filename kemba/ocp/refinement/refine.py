@@ -242,7 +242,7 @@ class Refiner:
         left but where modes do not fit."""
         scheme, price = RADAU3, Refining.price
         if step == FINER:
-            scheme, price = RADAU5, Refining.last_price
+            scheme, price = RADAU5, Refining.finer_price
         program, x = self.build(phases, start, scheme, price)
         if step != BEST:
             x = program.proximal(x, Refining.near)
@@ -272,7 +272,7 @@ class Refiner:
     ) -> Solution:
         """The program of a finer scheme solved for the task's cost, from a start `near` its
         solution; not solved where modes do not fit. `more` adds rows to it."""
-        program, x = self.build(phases, near, scheme, Refining.last_price)
+        program, x = self.build(phases, near, scheme, Refining.finer_price)
         more(program)
         options = warm(Refining.long_iterations) | central(Refining.mu, Refining.push)
         found = self._solve(program, program.loosened(x), options)

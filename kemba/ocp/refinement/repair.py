@@ -83,7 +83,7 @@ def next_repair(
     seen: Sequence[Sequence[Phase]],
     marks: Callable[[int], Sequence[int]],
 ) -> tuple[list[Phase], tuple[PhaseProgram, np.ndarray]] | None:
-    """Phases that were not `seen` yet, and the program and solution that they begin from: all
+    """Phases that were not `seen` yet, and the program and solution (size,) they begin from: all
     misfits of the first of the `known` orders are repaired, then each of its worst alone, then
     those of the next. None where nothing is left. `marks`: where phases end on so many nodes."""
     for one in known:
