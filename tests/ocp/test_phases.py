@@ -43,8 +43,6 @@ CASES = [
 ]
 QUICK = [CASES[1]]
 MARKS = {case: [] if case in QUICK else [pytest.mark.slow] for case in CASES}
-SOME = "800 iterations are enough on some processors only"  # the rounding of their BLAS decides
-MARKS["jump_forward", "distance=0.2 m"] += [pytest.mark.xfail(reason=SOME, strict=False)]
 EVERY = [pytest.param(*case, marks=marks) for case, marks in MARKS.items()]
 
 
@@ -84,7 +82,7 @@ def test_a_refined_plan_replays_within_2_mm_and_2_ms(name: str, override: str) -
     assert abs(done.apex_error_m) <= 2e-3
     assert (done.touchdown_error_s is not None) == (name != "max_jump")
     assert abs(done.touchdown_error_s or 0.0) <= 2e-3
-    assert done.landed == (name != "max_jump")
+    assert done.landed  # or flies on, as the plan does
 
 
 @pytest.mark.parametrize(("name", "override"), QUICK)

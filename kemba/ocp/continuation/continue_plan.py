@@ -169,7 +169,7 @@ class Continuation:
         stagnation = Stagnation(Continuing.patience, Continuing.underway, Refining.slow)
         found = solve_along(program, begin, options | known, self.control, stagnation)
         if not found.solved and kept is not None:
-            program, found = refiner.finer(mesh.phases, (program, x), program.scheme, ticks)
+            program, found = refiner.last_solve(mesh.phases, (program, x), program.scheme, ticks)
         assert found.ending is not None
         self.steps.append(Attempt("from the earlier plan", found.ending, found.iterations))
         self.size = len(program.lower), len(program.rows)

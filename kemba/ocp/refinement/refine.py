@@ -157,7 +157,7 @@ class Refiner:
             phases = self.phases(trim)
             if phases in self.seen:
                 break
-            found = self.solved(phases)
+            found = self.fitted(phases)
             if found.done:
                 break
         return replace(found, iterations=self.iterations)
@@ -195,13 +195,12 @@ class Refiner:
         keeps = made.certificate is not None and made.certificate.within(self.task.tolerances)
         return made if keeps else found
 
-    def solved(self, phases: list[Phase]) -> Refined:
+    def fitted(self, phases: list[Phase]) -> Refined:
         """The solution on phases, repaired until their modes fit, else how the last try ended.
 
-        All programs are elastic, also the last one: modes that fit are kept to the solver's
-        tolerance, while rows without slacks depend on each other where elements are short, and
-        IPOPT may not converge on them. Repairs are sought best first: those of the order of modes
-        that came furthest and is violated least.
+        All programs are elastic, also the last one, on which IPOPT often does not converge without
+        slacks; modes that fit are kept to its tolerance. Repairs are sought best first: those of
+        the order of modes that came furthest and is violated least.
         """
         known: list[Misfitting] = []
         start: Start = self.plan
@@ -225,7 +224,7 @@ class Refiner:
                     break
                 phases = self.evened(program, near)
             else:
-                found = self.fine(phases, start)
+                found = self.finished(phases, start)
                 if found.done:
                     return found
             better = next_repair(known, self.seen, self.marks)
@@ -250,20 +249,20 @@ class Refiner:
         options["mu_init"] = Refining.elastic_mu / 10**step
         return program, self._solve(program, program.loosened(x), options)
 
-    def fine(self, phases: Sequence[Phase], near: Start) -> Refined:
+    def finished(self, phases: Sequence[Phase], near: Start) -> Refined:
         """The solution by the finer scheme from one `near`; once more on other elements where a
         phase would last longer than its own can."""
-        solution = self.finer(phases, near, RADAU5)
+        solution = self.last_solve(phases, near, RADAU5)
         even = self.evened(*solution) if solution[1].solved else phases
         if even != phases:
             self.tell("phases: on elements shared by how long phases last")
-            again = self.finer(even, (solution[0], solution[1].Y), RADAU5)
+            again = self.last_solve(even, (solution[0], solution[1].Y), RADAU5)
             solution = again if again[1].solved else solution
         if solution[1].solved:
             self.solution = solution
         return read(*solution)
 
-    def finer(
+    def last_solve(
         self,
         phases: Sequence[Phase],
         near: Start,

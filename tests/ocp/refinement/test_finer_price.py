@@ -26,7 +26,7 @@ def test_the_last_elastic_program_has_the_exact_solution(tmp_path: Path) -> None
     for shift in (0.0, 1e-3):  # where it begins makes no difference
         exact, x = refiner.build(phases, (program, start + shift), RADAU5)
         rigid = solve(exact, Iterate(x), warm(200), Control())
-        elastic, found = refiner.finer(phases, (program, start + shift), RADAU5)
+        elastic, found = refiner.last_solve(phases, (program, start + shift), RADAU5)
         assert rigid.solved and found.solved
         assert found.objective == pytest.approx(rigid.objective, rel=1e-4)
         assert np.abs(found.Y[: len(x)] - rigid.Y).max() < 0.1
