@@ -53,10 +53,9 @@ class Refining:
     pulse_iterations = 60  # of one with another pulse
     # scaled: a plan nearer to its mirror image is solved by half; the certificate's tolerance
     mirrored = 1e-6
-    # of a mode violated by its scale; at a lower price modes that can hold are violated too
-    price = 1000.0
-    # the same by the finer scheme: multipliers of rates in elements of 0.2 ms are above 1e4
-    finer_price = 1e5
+    # of a mode violated by its scale; at a lower price modes that can hold are violated too: rates
+    # in elements of 0.2 ms have multipliers above 1e4
+    price = 1e5
     # proximal weight of solves near a start; where it is large beside the price, modes that can
     # hold are violated
     near = 0.01

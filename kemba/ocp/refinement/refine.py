@@ -237,12 +237,9 @@ class Refiner:
         self, phases: Sequence[Phase], start: Start, step: int
     ) -> tuple[PhaseProgram, Iterate]:
         """The elastic program of a step: near the start by the coarser scheme, then for the task's
-        cost, then for that near the start by the finer scheme, at a price at which no slacks are
-        left but where modes do not fit."""
-        scheme, price = RADAU3, Refining.price
-        if step == FINER:
-            scheme, price = RADAU5, Refining.finer_price
-        program, x = self.build(phases, start, scheme, price)
+        cost, then for that near the start by the finer scheme."""
+        scheme = RADAU5 if step == FINER else RADAU3
+        program, x = self.build(phases, start, scheme, Refining.price)
         if step != BEST:
             x = program.proximal(x, Refining.near)
         options = (warm if step == FINER else rough)(Refining.long_iterations)
@@ -271,7 +268,7 @@ class Refiner:
     ) -> Solution:
         """The program of a finer scheme solved for the task's cost, from a start `near` its
         solution; not solved where modes do not fit. `more` adds rows to it."""
-        program, x = self.build(phases, near, scheme, Refining.finer_price)
+        program, x = self.build(phases, near, scheme, Refining.price)
         more(program)
         options = warm(Refining.long_iterations) | central(Refining.mu, Refining.push)
         found = self._solve(program, program.loosened(x), options)
