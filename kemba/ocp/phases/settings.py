@@ -56,6 +56,9 @@ class Refining:
     # of a mode violated by its scale; at a lower price modes that can hold are violated too: rates
     # in elements of 0.2 ms have multipliers above 1e4
     price = 1e5
+    # of solves near a start, in which modes are not judged: from far off IPOPT does not converge at
+    # the price above (bound of hound: 200 iterations, 96 at this one)
+    first_price = 1e3
     # proximal weight of solves near a start; where it is large beside the price, modes that can
     # hold are violated
     near = 0.01

@@ -217,7 +217,7 @@ class Refiner:
                     return found
                 if not near.solved:
                     break
-                wrong = misfits(program, near.Y)
+                wrong = misfits(program, near.Y) if step != NEAREST else []
                 if wrong:
                     found = replace(found, reason=UNFIT)
                     known = best_first([*known, Misfitting(step, program, near.Y, wrong)])
@@ -236,10 +236,11 @@ class Refiner:
     def elastic(
         self, phases: Sequence[Phase], start: Start, step: int
     ) -> tuple[PhaseProgram, Iterate]:
-        """The elastic program of a step: near the start by the coarser scheme, then for the task's
-        cost, then for that near the start by the finer scheme."""
+        """The elastic program of a step: near the start by the coarser scheme, at a low price of
+        slacks, then for the task's cost, then for that near the start by the finer scheme."""
         scheme = RADAU5 if step == FINER else RADAU3
-        program, x = self.build(phases, start, scheme, Refining.price)
+        price = Refining.first_price if step == NEAREST else Refining.price
+        program, x = self.build(phases, start, scheme, price)
         if step != BEST:
             x = program.proximal(x, Refining.near)
         options = (warm if step == FINER else rough)(Refining.long_iterations)
