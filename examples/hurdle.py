@@ -8,6 +8,6 @@ from pictures import animate, save
 import kemba
 
 motion = kemba.plan("hurdle.yaml")
-print(motion.sentence)  # true on its own model; the simulated robot lands 29 ms late, 25 allowed
+print(motion.sentence)  # true on its own model; the simulated robot lands 27 ms late, 23 allowed
 save(motion.figure())
 animate(motion.path)
