@@ -199,8 +199,8 @@ def _moved(asked: Sequence[Requirement], begin: float, share: float) -> Iterator
         ahead = begin > 0.0 and r.quantity.name.endswith(AHEAD) and r.minus is None
         if ahead and r.at == 0.0 and r.quantity.name == "body/x":
             continue  # where a motion begins
-        if begin > 0.0 and r.location == ("start", "settled"):
-            continue  # air is settled after a while of rest only
+        if begin > 0.0 and r.location in (("start",), ("start", "settled")):
+            continue  # air is what the motion before leaves, and settled after a while of rest only
         minus = r.minus and replace(r.minus, at=at(r.minus.at))
         if ahead and r.at is not None:
             minus = Earlier("body/x", begin)

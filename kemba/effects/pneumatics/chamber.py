@@ -13,6 +13,7 @@ import numpy as np
 from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
+from kemba.effects.pneumatics.flow import ATMOSPHERE
 from kemba.errors import KembaError
 from kemba.quantity import Param, Quantity, Tolerance
 
@@ -30,6 +31,12 @@ ENTRY = Tolerance(0.02, each=True, source="assumed: parts of one make differ by 
 
 STEADY = ("F_extend", "F_retract")
 FIGURES = ("pressures", *STEADY, "fill", "vent")
+
+
+def pressure(side: str) -> Quantity:
+    """The pressure of a chamber."""
+    sizes = 1e4, 3e6, 2e5, ATMOSPHERE
+    return Quantity(f"chamber/{side}/P", "Pa", *sizes, f"{side}, absolute")
 
 
 class Chamber(Effect):
@@ -81,18 +88,19 @@ class Chamber(Effect):
         return vent + u * (fill - vent)
 
     def evaluate(self, at: At) -> Contribution:
-        x = at.piston.x
+        x, cylinder = at.piston.x, at.cylinder
         sides = {
-            "F_extend": ("e", x, at.u_e, at.F_e),
-            "F_retract": ("r", at.stroke - x, at.u_r, at.F_r),
+            "extend": ("e", cylinder.area_extend, x, at.u_e, at.F_e),
+            "retract": ("r", cylinder.area_retract, at.stroke - x, at.u_r, at.F_r),
         }
-        rate, publish = {}, dict[str, Any]()
-        for table, (c, way, u, F) in sides.items():
+        rate, publish, outputs = {}, dict[str, Any](), []
+        for side, (c, A, way, u, F) in sides.items():
             tau = at.rise_gain * self.rise_time(u, way, at.stroke)
-            static = at.supply_gain * at_supply(self, table, at.supply)
+            static = at.supply_gain * at_supply(self, f"F_{side}", at.supply)
             rate[f"F_{c}"] = (at.droop * static * u - F) / tau
             publish |= {f"F_static_{c}": static, f"tau_{c}": tau}
-        return Contribution({"piston": at.F_e - at.F_r}, rate, publish=publish)
+            outputs.append((pressure(side), ATMOSPHERE + F / A))
+        return Contribution({"piston": at.F_e - at.F_r}, rate, publish=publish, outputs=outputs)
 
 
 E = TypeVar("E", bound=Effect)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from typing_extensions import Self
 
 from kemba.effects.base import At, Contribution, Effect
-from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal, at_supply, beyond, filled
+from kemba.effects.pneumatics.chamber import OF_A_KIND, Pascal, at_supply, beyond, filled, pressure
 from kemba.effects.pneumatics.flow import (
     ATMOSPHERE,
     CHOKED,
@@ -72,11 +72,7 @@ class OrificeChamber(Effect):
         return beyond(self, supply, ("gauge",))
 
     def states(self) -> dict[str, Quantity]:
-        sizes = 1e4, 3e6, 2e5, ATMOSPHERE
-        return {
-            f"P_{side[0]}": Quantity(f"chamber/{side}/P", "Pa", *sizes, f"{side}, absolute")
-            for side in ("extend", "retract")
-        }
+        return {f"P_{side[0]}": pressure(side) for side in ("extend", "retract")}
 
     def rate(self, P: Any, V: Any, dV: Any, inflow: Any) -> Any:
         """dP/dt [Pa.s-1] of a chamber of volume V [m3] (eq. 1)."""

@@ -71,13 +71,14 @@ class Poses:
     @cached_property
     def _solver(self) -> ca.Function:
         node, n = self.model.node, len(self.names)
-        below, above, weight = ca.SX.sym("below", n), ca.SX.sym("above", n), ca.SX.sym("w", n + 1)
+        below, above, weight = (ca.SX.sym(name, n) for name in ("below", "above", "weight"))
+        lift = ca.SX.sym("lift")
         height = quantity_expression(self.model, "body/z")
         aims = ca.vertcat(*self.expressions.values())
         nlp = {
             "x": ca.vertcat(node.q, node.v, below, above),
-            "p": weight,
-            "f": ca.dot(weight[:n], below + above) - weight[n] * height + STILL * ca.sumsqr(node.v),
+            "p": ca.vertcat(weight, lift),
+            "f": ca.dot(weight, below + above) - lift * height + STILL * ca.sumsqr(node.v),
             "g": ca.vertcat(aims + below - above, self.walls),
         }
         return ca.nlpsol("pose", "ipopt", nlp, silent())

@@ -103,11 +103,16 @@ class Requirement:
 
 
 def quantities(model: Model) -> dict[str, Quantity]:
-    """Every quantity that a task may name: coordinates, rates, ports, states, inputs, forces."""
-    mechanism = model.mechanism
+    """Every quantity that a task may name: coordinates, rates, ports, states, inputs, forces, and
+    outputs of these."""
+    mechanism, node = model.mechanism, model.node
     ports = [q for p in mechanism.ports.values() for q in (p.quantity, p.rate)]
     named = [quantity for group in model.groups.values() for quantity in group]
-    known = {q.name: q for q in (*ports, *named)}
+    changes = ca.vertcat(node.a, node.sd)
+    of_these = [
+        q for q in node.output_quantities if not ca.depends_on(ca.SX(node.outputs[q.name]), changes)
+    ]
+    known = {q.name: q for q in (*of_these, *ports, *named)}
     points = [f"{leg}/{point}" for leg in mechanism.legs for point in POINTS]
     # heights above the ground, where these are heights above 0
     return {**{f"{p}/gap": known[f"{p}/z"] for p in points if f"{p}/z" in known}, **known}

@@ -12,6 +12,7 @@ from kemba.events import feet
 from kemba.mechanism.knee import flexion
 from kemba.mechanism.links import Robot
 from kemba.model import Model
+from kemba.model.rest import at_rest
 from kemba.ocp.task.moments import spans
 from kemba.ocp.task.requirement import Earlier, Requirement, highest, quantities
 from kemba.ocp.task.task import Task
@@ -19,6 +20,7 @@ from kemba.ocp.task.terrain import ground_at
 from kemba.trajectory import Trajectory
 
 FLIGHT = 0.7  # the part of the flight in which `clearance` holds; feet come down in the rest
+DIGITS = 6  # of a state at rest; equal legs differ by roundings
 AFTER = 1e-6  # of the motion: forces act from the node after the one at which a part begins
 
 
@@ -123,6 +125,24 @@ def closed_in_itself(task: Task, model: Model, others: Sequence[Requirement]) ->
     ]
 
 
+def within_the_supply(task: Task, model: Model, others: Sequence[Requirement]) -> list[Requirement]:
+    """What valves decide at rest, as pressures, no higher than there with valves all shut or all
+    open, where a motion begins with it free: no plan begins with more air than there is."""
+    if task.periodic is not None:
+        return []
+    q = [model.mechanism.standing[c.name] for c in model.mechanism.coordinates]
+    shut, full = (
+        at_rest(model, q, [float(valves and i.binary) for i in model.inputs.values()])
+        for valves in (False, True)
+    )
+    asked, found = {r.quantity.name for r in others if r.at == 0.0}, []
+    for i, state in enumerate(model.states.values()):
+        low, high = (round(float(x[i]) / state.scale, DIGITS) * state.scale for x in (shut, full))
+        if low != high and state.name not in asked:
+            found.append(Requirement(("start",), state, 0.0, -math.inf, max(low, high)))
+    return found
+
+
 Template = Callable[[Task, Model, Sequence[Requirement]], list[Requirement]]
 
 # key of a task: what it stands for, given what the task asks by name
@@ -131,6 +151,7 @@ TEMPLATES: dict[str, Template] = {
     "clearance": flight_clearance,
     "contacts": standing_feet,
     "periodic": closed_in_itself,
+    "start": within_the_supply,
 }
 
 

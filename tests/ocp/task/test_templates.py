@@ -72,3 +72,41 @@ def test_a_mistake_is_told_at_its_line(tmp_path: Path, was: str, now: str, said:
     with pytest.raises(KembaError) as caught:
         asked(tmp_path, BOUND.replace(was, now))
     assert said in str(caught.value)
+
+
+LEAP = """
+distance: 0.5 m
+nodes: 40
+start: {body/x: 0 m}
+end: {body/x: distance}
+"""
+
+
+@pytest.mark.parametrize(
+    ("model", "state", "most"), [("planning", "F", 324.0), ("orifice", "P", 7.25e5)]
+)
+def test_no_motion_begins_with_more_air_than_there_is(
+    model: str, state: str, most: float, tmp_path: Path
+) -> None:
+    tmp_path.joinpath("own.yaml").write_text(f"model: {model}\n{LEAP}")
+    found = asked_of(*load_task(tmp_path / "own.yaml"))[1]
+    begins = {r.label: r.upper for r in found if r.location == ("start",)}
+    assert begins[f"start:rear/chamber/extend/{state}"] == pytest.approx(most, rel=1e-3)
+    assert not any("hip" in label or "body" in label for label in begins)
+
+
+def test_air_that_the_task_gives_is_its_own(tmp_path: Path) -> None:
+    given = LEAP.replace("{body/x: 0 m}", "{body/x: 0 m, rear/chamber/*/F: 80 N, settled: true}")
+    assert not [label for label in asked(tmp_path, given) if label.startswith("start:")]
+    assert not [label for label in asked(tmp_path, BOUND) if label.startswith("start:")]
+
+
+def test_first_order_air_has_the_pressures_of_physical_one(tmp_path: Path) -> None:
+    """A task that bounds pressures is sought with first-order chambers, too."""
+    tmp_path.joinpath("own.yaml").write_text(
+        LEAP.replace("start:", "bounds: {'*/chamber/*/P': {at_most: 0.6 MPa}}\nstart:")
+    )
+    task, document = load_task(tmp_path / "own.yaml", ["model=orifice"])
+    for lags in (False, True):
+        labels = [r.label for r in asked_of(task, document, lags=lags)[1]]
+        assert "bounds.*/chamber/*/P:rear/chamber/extend/P" in labels
