@@ -108,9 +108,9 @@ class Planning:
 
     def plans(self, origin: Origin | None = None) -> Iterator[Plan]:
         """Plans of the task, made when asked for: from an earlier plan, then from one guess after
-        the other as long as they give any; none whose contacts and valves come in the order of an
-        earlier one, as the same program would refine it. In a scene with walls the guesses are
-        followed on level ground, and one in the scene itself comes last."""
+        the other, unless it is proven that there is none; none whose contacts and valves come in
+        the order of an earlier one, as the same program would refine it. In a scene with walls the
+        guesses are followed on level ground, and one in the scene itself comes last."""
         failed = ""
         if origin is not None and self.refused is None:
             near, failed = self.continued(origin)
@@ -134,7 +134,8 @@ class Planning:
             if found is None:
                 continue
             start = f"guess {number + 1}" if number else found.start
-            if guess.level and not (found.status.plan or found.status is Status.INTERRUPTED):
+            nothing = not (found.status.plan or found.status is Status.INTERRUPTED)
+            if nothing and (guess.level or (free and not found.relax)):
                 missed = replace(found, start=start)
                 continue
             orders.keep(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ import pytest
 
 from kemba.ocp import Plan, load_task
 from kemba.ocp.certificate.status import Status
+from kemba.ocp.infeasibility.explain import Relax
 from kemba.ocp.planner import Planner, searched
 from kemba.ocp.planning import Planning
 from kemba.ocp.refinement import order_of
@@ -48,6 +50,29 @@ def test_a_plan_of_a_known_order_is_not_refined_again(monkeypatch: pytest.Monkey
 def test_an_order_that_could_not_be_refined_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
     found = starts(monkeypatch, iter([False, True, True, True]), iter("aaab"))
     assert found == ["guess", "guess 2", "guess 4"]
+
+
+@pytest.mark.parametrize(
+    ("proven", "ended"), [(False, ["guess 2", "guess 3", "guess 4"]), (True, ["guess"])]
+)
+def test_a_guess_that_gives_no_plan_is_followed_by_others_unless_there_is_none(
+    proven: bool, ended: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A flip of two robots had no plan from its first guess, and was given up after 40 s of 300."""
+    own = planning("jump.yaml")
+    first = searched(own.planner, refused=True)
+    reason = Relax("goals.apex", "", "body/z", 0.5, 0.4, "m")
+    nothing = replace(first, status=Status.INFEASIBLE, relax=(reason,) if proven else ())
+    solves = itertools.chain([nothing], itertools.repeat(replace(first, status=Status.SOLVED)))
+    monkeypatch.setattr(Planning, "_from_guess", lambda *known: next(solves))
+    assert [found.start for found in own.plans()] == ended
+
+
+def test_where_no_guess_gives_a_plan_the_last_one_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = planning("jump.yaml")
+    nothing = replace(searched(own.planner, refused=True), status=Status.LIMIT)
+    monkeypatch.setattr(Planning, "_from_guess", lambda *known: nothing)
+    assert [(f.start, f.status) for f in own.plans()] == [("guess 4", Status.LIMIT)]
 
 
 def test_the_order_of_a_plan_is_that_of_its_contacts_and_valves() -> None:
