@@ -30,6 +30,7 @@ from kemba.ocp.planned import Plan, clear, explained
 from kemba.ocp.planner import Planner
 from kemba.ocp.reading import as_one, asked_of, motions
 from kemba.ocp.refinement import Order, order_of
+from kemba.ocp.relaxation.schedule import PENALTIES
 from kemba.ocp.relaxation.session import Session
 from kemba.ocp.sides import on_level_ground
 from kemba.ocp.task.requirement import Requirement
@@ -123,6 +124,7 @@ class Planning:
         task, planner, orders = self.planner.task, self.planner, _Orders()
         free = planner.start is None and self.refused is None
         walls = free and on_level_ground(planner.seeking) is not None
+        another = free and task.method not in PENALTIES  # the paper's way is one solve
         missed: Plan | None = None
         for number, guess in enumerate(guesses(task, planner.model, walls)):
             if number and self.over:
@@ -135,7 +137,7 @@ class Planning:
                 continue
             start = f"guess {number + 1}" if number else found.start
             nothing = not (found.status.plan or found.status is Status.INTERRUPTED)
-            if nothing and (guess.level or (free and not found.relax)):
+            if nothing and (guess.level or (another and not found.relax)):
                 missed = replace(found, start=start)
                 continue
             orders.keep(found)

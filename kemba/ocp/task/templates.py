@@ -130,7 +130,8 @@ def within_the_supply(task: Task, model: Model, others: Sequence[Requirement]) -
     open, where a motion begins with it free: no plan begins with more air than there is."""
     if task.periodic is not None:
         return []
-    q = [model.mechanism.standing[c.name] for c in model.mechanism.coordinates]
+    standing = model.mechanism.standing
+    q = [standing.get(c.name, c.value) for c in model.mechanism.coordinates]
     shut, full = (
         at_rest(model, q, [float(valves and i.binary) for i in model.inputs.values()])
         for valves in (False, True)
