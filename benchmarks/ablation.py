@@ -115,7 +115,6 @@ RULES = [
     Rule("simplest", PARSIMONY + "simplest", lambda s, belief: belief,
          lambda result, s, belief: result.best != belief.best),
     Rule("overclaimed", PARSIMONY + "overclaimed", lambda *_: False),
-    Rule("little", PARSIMONY + "is_little", lambda *_: False),
     Rule("idle", PARSIMONY + "is_unsupported", lambda *_: False),
     Rule("one part shows", "infer.cross_validation:one_part_shows", lambda *_: False),
     Rule("figures' share of a gain", "infer.cross_validation:figures_off", lambda *_: 0.0, always),

@@ -10,12 +10,19 @@ import pytest
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
+import ablation
 import full_plant_page
 import learning_page
 import robustness_page
 
 from kemba.scenarios.draw import load_uncertainties
 from kemba.units import read_si
+
+
+def test_every_rule_that_is_switched_off_is_one_of_the_program() -> None:
+    """A rule that was taken out of the program stopped the study at its first case."""
+    with ablation.watched(set()):
+        pass
 
 
 def execution(index: int, way: str, fault: str, of: str = "new") -> dict[str, Any]:

@@ -70,12 +70,12 @@ class Preview:
         """The object that `--json` prints; sizes by effect and parameter, as in an answer."""
         told, by = self.told, self.switches
         return {
-            "smallest_detectable": {e: {by[e].name: size} for e, size in told.sizes.items()},
+            "sizes": {e: {by[e].name: size} for e, size in told.sizes.items()},
             "usual": {e: {p.name: p.size} for e, p in by.items()},
             "shown": list(told.shown),
-            "alike": [list(group) for group in told.alike],
+            "classes": [list(group) for group in told.alike],
             "tests": [vars(test) for test in self.tests],
-            "sentence": told.sentence,
+            "advice": told.sentence,
         }
 
 

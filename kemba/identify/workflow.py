@@ -188,9 +188,13 @@ def _hold_against(found: Discovery) -> None:
     answer, settings = found.answer, VerdictSettings
     before, after = answer.error_before, answer.error_after
     leaves = f"leaves an error of {after:.3g} times the noise"
-    if answer.verdict == "missing" and not settings.is_whole(before, after):
-        answer.verdict, answer.remarks = "partly", [f"the answer {leaves}", *answer.remarks]
-        answer.rest, answer.next = rest_of(found.search, found.best, ())
+    if answer.verdict == "missing":
+        unchanged = round(after, 2) >= round(before, 2)
+        if unchanged or not settings.is_whole(before, after):
+            stays = f"leaves the quoted error at {after:.3g} times the noise"
+            reason = f"the answer {stays if unchanged else leaves}"
+            answer.verdict, answer.remarks = "partly", [reason, *answer.remarks]
+            answer.rest, answer.next = rest_of(found.search, found.best, ())
     elif answer.verdict == "nothing" and after > settings.plain:
         reason = f"the model as it is {leaves}, and no effect explains enough of it"
         answer.verdict, answer.remarks = "unknown", [reason, *answer.remarks]

@@ -62,9 +62,9 @@ def test_what_logs_could_show_is_told_without_a_search(folder: Path) -> None:
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
     assert "valve_delay" in found["shown"] and "seal_friction" not in found["shown"]
-    assert found["smallest_detectable"]["end_cushion"]["c"] is None
-    assert ["valve_delay", "sensor_delay:piston/F"] in found["alike"]
-    late = found["tests"][found["alike"].index(["valve_delay", "sensor_delay:piston/F"])]
+    assert found["sizes"]["end_cushion"]["c"] is None
+    assert ["valve_delay", "sensor_delay:piston/F"] in found["classes"]
+    late = found["tests"][found["classes"].index(["valve_delay", "sensor_delay:piston/F"])]
     assert "rig test" in late["test"] and "locked" not in late["test"] and late["nats"] > 5.0
     refused = run("compare", folder / "run_0.csv", "--what-could-be-seen", "--figure")
     assert refused.exit_code == 2 and "compares nothing" in refused.stderr

@@ -204,18 +204,34 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     good = np.flatnonzero(np.isfinite(y))
     values = y[good]
     equal = np.diff(values) == 0
-    start, end = max(runs(equal), key=lambda run: run[1] - run[0], default=(0, 0))
-    length = end - start
-    elsewhere = np.delete(equal, np.s_[start : start + length])
-    if length < limits.frozen or not len(elsewhere) or elsewhere.mean() > limits.repeats:
+    long = [(a, b) for a, b in runs(equal) if b - a >= limits.frozen]
+    step = step_of(values) if long else 0.0
+    held = [run for run in long if not _rests(values, *run, step)]
+    if not held:
+        return
+    start, end = max(held, key=lambda run: run[1] - run[0])
+    elsewhere = np.ones(len(equal), dtype=bool)
+    for a, b in long:
+        elsewhere[a:b] = False
+    if not elsewhere.any() or equal[elsewhere].mean() > limits.repeats:
         return
     if difference_sigma(values) < limits.quiet * np.ptp(values):
         return  # a simulation without noise may stand still
     value, row = values[start], int(good[start])
     at_end = value in (values.max(), values.min())
-    what = f"{length + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
+    what = f"{end - start + 1} readings in a row are exactly {value:.6g} {log.unit(name)}"
     hint = "is the sensor saturated?" if at_end else "is the sensor stuck?"
     yield _log_fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
+
+
+FEW = 3.5  # steps, within which a sensor that rests is left
+
+
+def _rests(values: Array, start: int, end: int, step: float) -> bool:
+    """Whether a sensor that reads in steps stands still from reading `start` to `end`: what rests,
+    on a stop too, begins to move slowly; where the log ends so, it has come to rest slowly."""
+    beside = values[end + 1] if end + 1 < len(values) else values[max(start - 1, 0)]
+    return step > 0 and abs(float(beside - values[start])) < FEW * step
 
 
 def _leap(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:

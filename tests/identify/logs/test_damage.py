@@ -9,7 +9,7 @@ import pytest
 
 from kemba.errors import KembaError
 from kemba.identify.answer import Answer
-from kemba.identify.logs.gate import check_logs
+from kemba.identify.logs.gate import _frozen, check_logs
 from kemba.identify.logs.reading import excerpts, read_log
 from kemba.identify.workflow import discover_logs
 from kemba.logs import load_map
@@ -230,3 +230,18 @@ def test_a_huge_log_is_cut_down(bench_log: Callable[..., Trajectory]) -> None:
     pieces, remarks = excerpts([long])
     assert sum(len(p) for p in pieces) <= 60_000 and len(pieces) > 5
     assert len(remarks) == 2
+
+
+@pytest.mark.parametrize("step", [2e-5, 1e-4])
+def test_an_encoder_that_rests_before_the_motion_is_not_stuck(step: float, tmp_path: Path) -> None:
+    """On a grid a sensor at rest repeats itself; it is left by a step or two."""
+    time = np.arange(2000) / 1e3
+    phase = 10 * np.pi * np.clip(time - 0.325, 0.0, None)
+    x = step * np.round((0.010 + 0.025 * (1 - np.cos(phase))) / step)
+    noise = np.random.default_rng(0).standard_normal(len(time))
+    valve = (phase > 0) & (np.floor(phase) % 2 == 0)
+    columns = {"piston/x [m]": x, "valve/extend [1]": valve.astype(float),
+               "valve/retract [1]": 0 * time, "piston/F [N]": noise}  # fmt: skip
+    log = Trajectory(time, columns, {"kind": "bench"})
+    assert not list(_frozen(log, "piston/x", x))
+    assert list(_frozen(log, "piston/x", np.minimum(x, 0.04))), "it is saturated"
