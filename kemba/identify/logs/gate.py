@@ -224,7 +224,7 @@ def _frozen(log: Trajectory, name: str, y: Array) -> Iterator[KembaError]:
     yield _log_fault(log, what, "the channel is noisy elsewhere", hint, row=row, column=name)
 
 
-FEW = 3.5  # steps, within which a sensor that rests is left
+FEW = 2.5  # steps, within which a sensor that rests is left
 
 
 def _rests(values: Array, start: int, end: int, step: float) -> bool:
