@@ -262,7 +262,7 @@ CLOCKS: dict[str, Callable[[Trajectory], dict[str, np.ndarray]]] = {
 def _desired(log: Trajectory, scheme: str, rng: Rng) -> dict[str, np.ndarray]:
     word = {"snake": "{}_des", "topics": "{}_desired", "words": "{} Setpoint", "camel": "{}Ref",
             "german": "{}_soll", "dotted": "{}.target", "planar": "{}_cmd"}  # fmt: skip
-    form = word.get(scheme, "{}_ref")
+    form = word.get(scheme, "{}_demand")
     names = ["body/z", "front/hip/q", "rear/piston/x"]
     return {form.format(_name(scheme, n)): log[n] + 0.01 for n in names}
 

@@ -62,7 +62,8 @@ WORDS: dict[str, dict[str, str]] = {
     },
     "role": {
         "desired": "des desired ref reference target setpoint sp goal soll planned plan cmd "
-        "command commanded estimate est estimated predicted model sim",
+        "command commanded demand demanded request requested wanted traj trajectory expected "
+        "estimate est estimated predicted model sim",
         "measured": "meas measured measurement actual act ist fb feedback sensor",
     },
 }
